@@ -6,10 +6,10 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3};
 
 use super::heights::Largest;
-use super::layers::{LayeredMap, ProductTerm, Relief, Source};
+use super::layers::{LayeredMap, ProductTerm, Relief, Source, SurfacePoint};
 use super::slopes::{Focus, SlopeDriver, Slopes};
 use super::statistics::{PlaceDriver, PlaceMap};
-use super::{Distribution, Normal, Quantiles, StopMap};
+use super::{Distribution, Normal, StopMap};
 use crate::scene::Gaussianize;
 
 /// Distribution of the heights that are seen and lit [deviations].
@@ -18,8 +18,6 @@ pub enum HeightsSeen {
     /// D_h itself (Eq. 16).
     Smith(Largest),
     Normal(Normal),
-    /// A normal distribution of the ranks of heights, and the way back to heights.
-    Ranked(Normal, Arc<Quantiles>),
 }
 
 impl HeightsSeen {
@@ -28,7 +26,6 @@ impl HeightsSeen {
         match self {
             Self::Smith(largest) => map.mean(largest),
             Self::Normal(normal) => map.mean(normal),
-            Self::Ranked(normal, quantiles) => quantiles.compose(map).mean(normal),
         }
     }
 
@@ -37,17 +34,6 @@ impl HeightsSeen {
         match self {
             Self::Smith(largest) => largest.moments(),
             Self::Normal(normal) => *normal,
-            Self::Ranked(normal, quantiles) => {
-                // Midpoints of equal parts of the normal distribution.
-                const PARTS: usize = 256;
-                let value = |k: usize| {
-                    let z = super::normal::quantile((k as f64 + 0.5) / PARTS as f64);
-                    quantiles.value(normal.mean + normal.deviation * z)
-                };
-                let mean = (0..PARTS).map(value).sum::<f64>() / PARTS as f64;
-                let square = (0..PARTS).map(|k| (value(k) - mean).powi(2)).sum::<f64>() / PARTS as f64;
-                Normal { mean, deviation: square.sqrt() }
-            }
         }
     }
 }
@@ -58,57 +44,132 @@ pub enum SlopesSeen<'a> {
     Joint { weight: &'a dyn Fn(DVec2) -> DVec3, focus: Option<Focus> },
     /// By what is seen, apart from light and BRDF (Eqs. 19 and 20); the direction to the viewer.
     Apart(DVec3),
-    /// Slopes and weights of facets, where the surface overhangs.
-    Facets(&'a [(DVec2, f64)]),
+}
+
+/// The surface that is visible, lit and reflects.
+pub enum SurfaceSeen<'a> {
+    /// Points of a tile, with weights for each channel.
+    Facets(&'a [(SurfacePoint, DVec3)]),
+    /// A surface whose heights and slopes are Gaussian and independent.
+    Gaussian { heights: HeightsSeen, slopes: SlopesSeen<'a> },
 }
 
 /// Everything that the colour of what is seen and lit depends on.
 pub struct VisibleValues<'a> {
-    pub heights: HeightsSeen,
-    pub slopes: SlopesSeen<'a>,
+    pub surface: SurfaceSeen<'a>,
     pub gaussianize: Gaussianize,
 }
 
 impl VisibleValues<'_> {
     /// The mean colour of the map.
     pub fn color(&self, map: &LayeredMap) -> DVec3 {
-        map.terms().iter().map(|term| self.term(term, &map.relief)).sum()
+        map.terms().iter().map(|term| self.of_term(term, &map.relief)).sum()
     }
 
-    fn term(&self, term: &ProductTerm, relief: &Relief) -> DVec3 {
-        let mut color = DVec3::splat(term.factor);
-        for (place, map) in &term.places {
-            color *= whole_mean(place, map, self.gaussianize);
+    /// The mean colour of a product of maps.
+    pub fn of_term(&self, term: &ProductTerm, relief: &Relief) -> DVec3 {
+        let places = term.places.iter().map(|(place, map)| whole_mean(place, map, self.gaussianize));
+        let of_surface = match &self.surface {
+            SurfaceSeen::Facets(facets) => mean_of_facets(facets, term, relief),
+            SurfaceSeen::Gaussian { heights, slopes } => mean_of_gaussian(heights, slopes, term, relief),
+        };
+        places.product::<DVec3>() * of_surface * term.factor
+    }
+}
+
+/// The mean of a term's maps of heights, slopes and sums over facets.
+fn mean_of_facets(facets: &[(SurfacePoint, DVec3)], term: &ProductTerm, relief: &Relief) -> DVec3 {
+    if term.height.is_none() && term.slopes.is_empty() && term.sums.is_empty() {
+        return DVec3::ONE;
+    }
+    let height = Source::Height { noise: 0.0 };
+    let slopes: Vec<_> = term.slopes.iter().map(|(driver, map)| (Source::Slope(*driver), map)).collect();
+    // Textures and noise know nothing of the surface: in sums they add variance.
+    let variance = |(source, weight): &(Source, f64)| match source {
+        Source::Place(_) => weight * weight,
+        Source::Height { noise } => (weight * noise).powi(2),
+        Source::Slope(_) | Source::Sum(_) => 0.0,
+    };
+    let sums: Vec<_> =
+        term.sums.iter().map(|(sum, map)| (sum, map, sum.iter().map(variance).sum::<f64>().sqrt())).collect();
+    let at = |point: &SurfacePoint| {
+        let mut color = term.height.as_ref().map_or(DVec3::ONE, |map| map.color(height.value(point, relief)));
+        for (source, map) in &slopes {
+            color *= map.color(source.value(point, relief));
         }
-        if let Some(map) = &term.height {
-            color *= if relief.height.deviation > 0.0 { self.heights.mean(map) } else { map.color(0.0) };
-        }
-        if !term.slopes.is_empty() {
-            color *= self.slope_color(&term.slopes, relief);
-        }
-        for (sum, map) in &term.sums {
-            color *= map.mean(&self.sum_moments(sum, relief));
+        for (sum, map, deviation) in &sums {
+            let of_surface = sum.iter().filter(|(source, _)| !matches!(source, Source::Place(_)));
+            let mean = of_surface.map(|(source, weight)| weight * source.value(point, relief)).sum();
+            color *= map.mean(&Normal { mean, deviation: *deviation });
         }
         color
-    }
+    };
+    let total: DVec3 = facets.iter().map(|(_, weight)| *weight).sum();
+    let sum: DVec3 = facets.iter().map(|(point, weight)| at(point) * *weight).sum();
+    // A channel that reflects nothing takes the colour of the mean height and slope.
+    let mean = SurfacePoint { place: DVec2::ZERO, height: relief.height.mean, slope: relief.slopes.mean };
+    DVec3::select(total.cmpgt(DVec3::ZERO), sum / total, at(&mean))
+}
 
+/// The mean of a term's maps of heights, slopes and sums over a Gaussian surface.
+fn mean_of_gaussian(heights: &HeightsSeen, slopes: &SlopesSeen<'_>, term: &ProductTerm, relief: &Relief) -> DVec3 {
+    let mut color = DVec3::ONE;
+    if let Some(map) = &term.height {
+        color *= if relief.height.deviation > 0.0 { heights.mean(map) } else { map.color(0.0) };
+    }
+    if !term.slopes.is_empty() {
+        color *= slopes.color(&term.slopes, relief);
+    }
+    for (sum, map) in &term.sums {
+        color *= map.mean(&sum_moments(heights, slopes, sum, relief));
+    }
+    color
+}
+
+/// Moments of a weighted sum of standardized drivers: sums of means, and of variances of independent parts.
+fn sum_moments(heights: &HeightsSeen, slopes: &SlopesSeen<'_>, terms: &[(Source, f64)], relief: &Relief) -> Normal {
+    let (mut mean, mut variance, mut of_heights) = (0.0, 0.0, 0.0);
+    let mut across = DVec2::ZERO;
+    for (source, weight) in terms {
+        match source {
+            Source::Place(_) => variance += weight * weight,
+            Source::Height { noise } => {
+                of_heights += weight;
+                variance += (weight * noise).powi(2);
+            }
+            Source::Slope(SlopeDriver::Along { azimuth }) => {
+                let unit = relief.slopes.driver(*azimuth);
+                if unit.deviation > 0.0 {
+                    across -= DVec2::from_angle(*azimuth) * (weight / unit.deviation);
+                    mean -= weight * unit.mean / unit.deviation;
+                }
+            }
+            Source::Slope(SlopeDriver::Steepness) | Source::Sum(_) => {}
+        }
+    }
+    if of_heights != 0.0 && relief.height.deviation > 0.0 {
+        let at = heights.moments();
+        mean += of_heights * at.mean;
+        variance += (of_heights * at.deviation).powi(2);
+    }
+    if across != DVec2::ZERO {
+        let seen = slopes.moments(&relief.slopes);
+        mean += seen.mean.dot(across);
+        variance += seen.variance_along(across);
+    }
+    Normal { mean, deviation: variance.max(0.0).sqrt() }
+}
+
+impl SlopesSeen<'_> {
     /// The mean of the product of maps of slopes.
-    pub fn slope_color(&self, maps: &[(SlopeDriver, StopMap)], relief: &Relief) -> DVec3 {
+    fn color(&self, maps: &[(SlopeDriver, StopMap)], relief: &Relief) -> DVec3 {
         let maps: Vec<(SlopeDriver, StopMap)> =
             maps.iter().map(|(driver, map)| (*driver, in_own_unit(map, Source::Slope(*driver).unit(relief)))).collect();
         let at = |s: DVec2| maps.iter().map(|(driver, map)| map.color(driver.value(s))).product::<DVec3>();
         let slopes = &relief.slopes;
-        match &self.slopes {
-            SlopesSeen::Facets(facets) => {
-                let total: f64 = facets.iter().map(|facet| facet.1).sum();
-                if total > 0.0 {
-                    facets.iter().map(|(s, weight)| at(*s) * *weight).sum::<DVec3>() / total
-                } else {
-                    at(slopes.mean)
-                }
-            }
-            SlopesSeen::Joint { weight, focus } => joint_mean(slopes, &maps, *focus, *weight, &at),
-            SlopesSeen::Apart(o) => match &maps[..] {
+        match self {
+            Self::Joint { weight, focus } => joint_mean(slopes, &maps, *focus, *weight, &at),
+            Self::Apart(o) => match &maps[..] {
                 [(SlopeDriver::Along { azimuth }, map)] => map.mean(&slopes.visible(*o).driver(*azimuth)),
                 _ => {
                     let seen = |s: DVec2| DVec3::splat((o.z - s.dot(o.truncate())).max(0.0));
@@ -118,56 +179,11 @@ impl VisibleValues<'_> {
         }
     }
 
-    /// Moments of a weighted sum of standardized drivers: sums of means, and of variances of independent parts.
-    fn sum_moments(&self, terms: &[(Source, f64)], relief: &Relief) -> Normal {
-        let (mut mean, mut variance, mut heights) = (0.0, 0.0, 0.0);
-        let mut across = DVec2::ZERO;
-        for (source, weight) in terms {
-            match source {
-                Source::Place(_) => variance += weight * weight,
-                Source::Height { noise } => {
-                    heights += weight;
-                    variance += (weight * noise).powi(2);
-                }
-                Source::Slope(SlopeDriver::Along { azimuth }) => {
-                    let unit = relief.slopes.driver(*azimuth);
-                    if unit.deviation > 0.0 {
-                        across -= DVec2::from_angle(*azimuth) * (weight / unit.deviation);
-                        mean -= weight * unit.mean / unit.deviation;
-                    }
-                }
-                Source::Slope(SlopeDriver::Steepness) | Source::Sum(_) => {}
-            }
-        }
-        if heights != 0.0 && relief.height.deviation > 0.0 {
-            let at = self.heights.moments();
-            mean += heights * at.mean;
-            variance += (heights * at.deviation).powi(2);
-        }
-        if across != DVec2::ZERO {
-            let seen = self.slope_moments(&relief.slopes);
-            mean += seen.mean.dot(across);
-            variance += seen.variance_along(across);
-        }
-        Normal { mean, deviation: variance.max(0.0).sqrt() }
-    }
-
-    fn slope_moments(&self, slopes: &Slopes) -> Slopes {
-        match &self.slopes {
-            SlopesSeen::Apart(o) => slopes.visible(*o),
-            SlopesSeen::Joint { weight, focus } => {
+    fn moments(&self, slopes: &Slopes) -> Slopes {
+        match self {
+            Self::Apart(o) => slopes.visible(*o),
+            Self::Joint { weight, focus } => {
                 slopes.weighted_moments(*focus, &|s| weight(s).element_sum()).unwrap_or(*slopes)
-            }
-            SlopesSeen::Facets(facets) => {
-                let total: f64 = facets.iter().map(|facet| facet.1).sum();
-                if total <= 0.0 {
-                    return *slopes;
-                }
-                let mean = facets.iter().map(|(s, w)| *s * *w).sum::<DVec2>() / total;
-                let second =
-                    |f: &dyn Fn(DVec2) -> f64| facets.iter().map(|(s, w)| f(*s - mean) * w).sum::<f64>() / total;
-                let covariance = [second(&|d| d.x * d.x), second(&|d| d.x * d.y), second(&|d| d.y * d.y)];
-                Slopes { mean, covariance }
             }
         }
     }

@@ -8,8 +8,7 @@ fn layers(text: &str) -> LayeredMap {
 
 fn seen(slopes: SlopesSeen<'_>) -> VisibleValues<'_> {
     VisibleValues {
-        heights: HeightsSeen::Normal(Normal { mean: 0.4, deviation: 0.8 }),
-        slopes,
+        surface: SurfaceSeen::Gaussian { heights: HeightsSeen::Normal(Normal { mean: 0.4, deviation: 0.8 }), slopes },
         gaussianize: Gaussianize::Auto,
     }
 }
@@ -53,13 +52,30 @@ fn light_and_brdf_inside_the_mean_of_slopes_differ_from_the_papers_separation_wh
 }
 
 #[test]
-fn facets_with_the_weights_of_a_density_give_its_color() {
-    let map =
-        layers("[[color_map.layer]]\ndriver = { kind = \"steepness\" }\nunit = \"value\"\nstops = [[0, 0], [1, 1]]\n");
-    let facets: Vec<(DVec2, f64)> = (0..100).map(|k| (DVec2::new(f64::from(k) / 200.0, 0.0), 1.0)).collect();
-    let ours = seen(SlopesSeen::Facets(&facets)).color(&map).x;
-    assert!((ours - 0.2475).abs() < 1e-9, "{ours}");
+fn the_color_of_facets_is_their_weighted_mean_in_each_channel_and_sums_are_blurred_by_their_noise() {
+    let map = layers(
+        "[[color_map.layer]]\ndriver = { kind = \"steepness\" }\nunit = \"value\"\nstops = [[0, 0], [1, 1]]\n\
+         [[color_map.layer]]\nweight = 0.5\nstops = [[0, 0], [0, 1]]\n[color_map.layer.driver]\nkind = \"sum\"\n\
+         terms = [{ driver = { kind = \"height\", noise = 1.0 }, weight = 3.0 }, { driver = { kind = \"slope\" }, weight = 4.0 }]\n",
+    );
+    // Two heights and slopes; the third channel sees only the first.
+    let point = |height, x| SurfacePoint { place: DVec2::ZERO, height, slope: DVec2::new(x, 0.0) };
+    let facets = [(point(0.4, 0.2), DVec3::new(1.0, 3.0, 2.0)), (point(0.2, -0.6), DVec3::new(1.0, 1.0, 0.0))];
+    let seen = VisibleValues { surface: SurfaceSeen::Facets(&facets), gaussianize: Gaussianize::Auto };
+    // Deviations: heights 1 and -1, slopes -0.2 and 0.6 over 0.12^½. The noise in the sum has the deviation of its weight.
+    let deviation = |weight: f64| weight / 34.0_f64.sqrt();
+    let of = |height: f64, slope: f64, steepness: f64| {
+        let sum = deviation(3.0) * height + deviation(4.0) * slope / 0.12_f64.sqrt();
+        steepness + 0.5 * super::super::normal::cdf(sum / deviation(3.0))
+    };
+    let (first, second) = (of(1.0, -0.2, 0.2), of(-1.0, 0.6, 0.6));
+    let exact = DVec3::new(0.5 * (first + second), 0.75 * first + 0.25 * second, first);
+    let ours = seen.color(&map);
+    assert!((ours - exact).abs().max_element() < 1e-9, "{ours} {exact}");
     assert!(naive_color(&map).x > 0.4 && !is_naive_enough(&map));
+    // Without weight the mean surface shows, and a map of textures alone has no surface.
+    let dark = VisibleValues { surface: SurfaceSeen::Facets(&[]), gaussianize: Gaussianize::Auto };
+    assert!((dark.color(&map).x - of(0.0, 0.0, 0.0)).abs() < 1e-9);
 }
 
 #[test]

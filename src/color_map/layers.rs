@@ -314,6 +314,11 @@ impl Source {
 }
 
 impl ProductTerm {
+    /// One map of slopes, in deviations.
+    pub fn of_slope(driver: SlopeDriver, map: StopMap) -> Self {
+        Self { factor: 1.0, places: Vec::new(), height: None, slopes: vec![(driver, map)], sums: Vec::new() }
+    }
+
     fn new(factor: f64, maps: &[DrivenMap]) -> Self {
         let mut term = Self { factor, places: Vec::new(), height: None, slopes: Vec::new(), sums: Vec::new() };
         for DrivenMap { driver, map, .. } in maps {

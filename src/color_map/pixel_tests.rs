@@ -1,4 +1,4 @@
-use super::super::filter::{HeightsSeen, SlopesSeen, VisibleValues};
+use super::super::filter::{HeightsSeen, SlopesSeen, SurfaceSeen, VisibleValues};
 use super::super::layers::tests::{RELIEF, resolved};
 use super::super::slopes::direction;
 use super::*;
@@ -43,8 +43,10 @@ fn a_pixel_that_sees_one_point_has_the_colour_of_that_point() {
 fn a_pixel_that_sees_the_whole_surface_from_above_has_the_filters_colour() {
     let map = resolved(LAYERS);
     let seen = VisibleValues {
-        heights: HeightsSeen::Normal(Normal { mean: 0.0, deviation: 1.0 }),
-        slopes: SlopesSeen::Apart(direction(0.0, 0.0)),
+        surface: SurfaceSeen::Gaussian {
+            heights: HeightsSeen::Normal(Normal { mean: 0.0, deviation: 1.0 }),
+            slopes: SlopesSeen::Apart(direction(0.0, 0.0)),
+        },
         gaussianize: crate::scene::Gaussianize::Auto,
     };
     let all = NarrowSlopes { mean: RELIEF.slopes.mean, covariance: RELIEF.slopes.covariance };

@@ -5,18 +5,17 @@ use std::sync::{Arc, OnceLock};
 use glam::{DVec2, DVec3, Vec3};
 
 use super::inputs::Processor;
-use super::stages::MeasureHeights;
-use super::{Keyed, Outcome, Pipeline, StageTimes};
+use super::{Outcome, Pipeline, StageTimes};
 use crate::base::{Cancel, InputError, Result};
 use crate::brdf::{LUMINANCE, Material, Term};
-use crate::color_map::filter::{HeightsSeen, SlopesSeen, VisibleValues, naive_color};
+use crate::color_map::filter::{HeightsSeen, SlopesSeen, SurfaceSeen, VisibleValues, naive_color};
 use crate::color_map::heights::{Largest, lit_part, pair_exponent, paper_moments};
-use crate::color_map::layers::{DrivenMap, Layer, LayeredMap, ResolvedDriver, Source};
+use crate::color_map::layers::{DrivenMap, Layer, LayeredMap, ProductTerm, ResolvedDriver, Source, SurfacePoint};
 use crate::color_map::slopes::{Focus, SlopeDriver, Slopes, direction};
-use crate::color_map::statistics::{Footprint, PlaceMap, RankedHeights};
+use crate::color_map::statistics::{Footprint, PlaceMap};
 use crate::color_map::{Normal, PrefilteredTable, Stop, StopMap};
 use crate::diagnostics;
-use crate::geometry::relief::slope_of;
+use crate::geometry::relief::surface_point;
 use crate::geometry::{ColorField, Facets};
 use crate::math::directions::half_vector;
 use crate::plan::Refinement;
@@ -32,12 +31,12 @@ pub struct ColorFilter {
     spec: ColorMap,
     facets: Arc<Facets>,
     visibility: Arc<Visibility>,
-    heights: Arc<RankedHeights>,
+    /// What the map colours each facet by.
+    points: Vec<SurfacePoint>,
     materials: Vec<Material>,
     material_of_slot: Vec<usize>,
     /// Part of the surface with each material.
     shares: Vec<f64>,
-    overhangs: bool,
     tables: Vec<OnceLock<PrefilteredTable>>,
     places: Vec<OnceLock<Option<PlaceMap>>>,
 }
@@ -78,8 +77,9 @@ impl Pipeline {
             let expected = "`measured`, or an analytic surface in `[color_map.surface]`";
             return Err(InputError::new("color_map.distribution", found, expected).into());
         }
-        let heights: Keyed<RankedHeights> =
-            self.get(MeasureHeights { tile, facets: &inputs.facets, settings: &inputs.settings }, &mut times)?;
+        let facets = &inputs.facets.value;
+        let points = facets.positions.iter().zip(facets.coloring_normals(&tile.mesh));
+        let points = points.map(|(position, normal)| surface_point(tile.mesh.size, *position, *normal)).collect();
         let materials = inputs.materials.materials.clone();
         let mut shares = vec![0.0; materials.len()];
         for (slot, area) in inputs.facets.slots.iter().zip(&inputs.facets.areas) {
@@ -91,11 +91,10 @@ impl Pipeline {
             spec: spec.clone(),
             facets: inputs.facets.value.clone(),
             visibility: visibility.value.clone(),
-            heights: heights.value,
+            points,
             materials,
             material_of_slot: inputs.material_of_slot,
             shares,
-            overhangs,
             tables: map.layers.iter().map(|_| OnceLock::new()).collect(),
             places: map.layers.iter().map(|_| OnceLock::new()).collect(),
         })
@@ -138,17 +137,19 @@ impl ColorFilter {
         let relief = &self.map.relief;
         let mapped = &self.map.layers[layer].mapped;
         let weight = |s: DVec2| DVec3::splat((o.z - s.dot(o.truncate())).max(0.0));
-        let facets = if self.is_by_facets() { self.seen_facets(o) } else { Vec::new() };
-        let slopes = if self.is_by_facets() {
-            SlopesSeen::Facets(&facets)
+        let facets: Vec<(SurfacePoint, DVec3)>;
+        let heights = HeightsSeen::Normal(STANDARD);
+        let surface = if self.is_measured() {
+            facets = self.points.iter().copied().zip(self.projected(o.as_vec3()).map(DVec3::splat)).collect();
+            SurfaceSeen::Facets(&facets)
         } else if self.spec.distribution == HeightDistribution::Paper {
-            SlopesSeen::Apart(o)
+            SurfaceSeen::Gaussian { heights, slopes: SlopesSeen::Apart(o) }
         } else {
-            SlopesSeen::Joint { weight: &weight, focus: None }
+            SurfaceSeen::Gaussian { heights, slopes: SlopesSeen::Joint { weight: &weight, focus: None } }
         };
-        let seen = VisibleValues { heights: HeightsSeen::Normal(STANDARD), slopes, gaussianize: self.spec.gaussianize };
+        let seen = VisibleValues { surface, gaussianize: self.spec.gaussianize };
         let color = match &mapped.driver.source {
-            Source::Slope(driver) => seen.slope_color(&[(*driver, mapped.map.clone())], relief),
+            Source::Slope(driver) => seen.of_term(&ProductTerm::of_slope(*driver, mapped.map.clone()), relief),
             _ => mapped.map.color(0.0),
         };
         (relief.slopes.visible(o), color)
@@ -190,31 +191,20 @@ impl ColorFilter {
             HeightDistribution::Paper => lambda_i + lambda_o,
             _ => pair_exponent(lambda_o, lambda_i, i.y.atan2(i.x) - o.y.atan2(o.x)),
         };
-        let weights = if self.is_measured() { Some(self.weights(i.as_vec3(), o.as_vec3())) } else { None };
-        let heights = match (&weights, self.spec.distribution) {
-            (Some(weights), _) => HeightsSeen::Ranked(
-                self.heights.moments(weights.reflected.iter().copied()).unwrap_or(STANDARD),
-                self.heights.quantiles.clone(),
-            ),
-            (None, HeightDistribution::Paper) => HeightsSeen::Normal(paper_moments(exponent)),
-            (None, _) => HeightsSeen::Smith(Largest { exponent }),
-        };
-        let facets: Vec<(DVec2, f64)> = match &weights {
-            Some(weights) if self.overhangs => {
-                self.facets.normals.iter().map(|n| slope_of(*n)).zip(weights.reflected.iter().copied()).collect()
-            }
-            _ => Vec::new(),
-        };
+        let gaussianize = self.spec.gaussianize;
+        if self.is_measured() {
+            let weights = self.weights(i.as_vec3(), o.as_vec3());
+            let facets: Vec<_> = self.points.iter().copied().zip(weights.reflected).collect();
+            return read(&VisibleValues { surface: SurfaceSeen::Facets(&facets), gaussianize }, weights.lit);
+        }
         let weight = |s: DVec2| self.reflected(s, i, o);
-        let slopes = if self.is_by_facets() {
-            SlopesSeen::Facets(&facets)
-        } else if self.spec.distribution == HeightDistribution::Paper {
-            SlopesSeen::Apart(o)
+        let (heights, slopes) = if self.spec.distribution == HeightDistribution::Paper {
+            (HeightsSeen::Normal(paper_moments(exponent)), SlopesSeen::Apart(o))
         } else {
-            SlopesSeen::Joint { weight: &weight, focus: self.focus(i, o) }
+            (HeightsSeen::Smith(Largest { exponent }), SlopesSeen::Joint { weight: &weight, focus: self.focus(i, o) })
         };
-        let seen = VisibleValues { heights, slopes, gaussianize: self.spec.gaussianize };
-        read(&seen, weights.map_or_else(|| lit_part(lambda_o, exponent), |weights| weights.lit))
+        let surface = SurfaceSeen::Gaussian { heights, slopes };
+        read(&VisibleValues { surface, gaussianize }, lit_part(lambda_o, exponent))
     }
 
     /// The colour of the mean of every driver.
@@ -253,14 +243,10 @@ impl ColorFilter {
             && self.map.is_of_surface()
         {
             let [i, o] = SMITH_CHECK.map(|[theta, phi]| direction(theta, phi));
-            let mut measured = HeightsSeen::Normal(STANDARD);
-            if let Some(at) = self.heights.moments(self.weights(i.as_vec3(), o.as_vec3()).reflected.into_iter()) {
-                measured = HeightsSeen::Ranked(at, self.heights.quantiles.clone());
-            }
             let slopes = &self.map.relief.slopes;
             let apart = SMITH_CHECK[0][1] - SMITH_CHECK[1][1];
             let exponent = pair_exponent(slopes.lambda(o), slopes.lambda(i), apart);
-            let difference = (measured.moments().mean - Largest { exponent }.moments().mean).abs();
+            let difference = (self.mean_height(i.as_vec3(), o.as_vec3()) - Largest { exponent }.moments().mean).abs();
             if difference > MAX_SMITH_ERROR {
                 warnings.push(format!(
                     "smith is far from this tile: visible heights differ by {difference:.2} deviations; set distribution = \"measured\""
@@ -270,26 +256,30 @@ impl ColorFilter {
         warnings
     }
 
-    /// Heights come from the facets. An analytic surface has none, so that Smith's distribution takes their place.
+    /// Heights and slopes come from the facets. An analytic surface has none, so that Smith's distribution takes their
+    /// place.
     fn is_measured(&self) -> bool {
         self.spec.distribution == HeightDistribution::Measured && self.spec.surface.is_none()
     }
 
-    /// Slopes come from the facets as well, because they are no function of normal heights.
-    fn is_by_facets(&self) -> bool {
-        self.is_measured() && self.overhangs
-    }
-
-    /// Facets' slopes with the projected areas that a viewer sees.
-    fn seen_facets(&self, o: DVec3) -> Vec<(DVec2, f64)> {
-        let o = o.as_vec3();
+    /// The visible projected area of each facet.
+    fn projected(&self, o: Vec3) -> impl Iterator<Item = f64> {
         let mut visible = vec![0.0; self.facets.len()];
         self.visibility.fill(o, 0..self.facets.len(), &mut visible);
-        let facet = |s: usize| {
-            let n = self.facets.normals[s];
-            (slope_of(n), f64::from(visible[s] * n.dot(o).max(0.0) * self.facets.areas[s]))
-        };
-        (0..self.facets.len()).map(facet).collect()
+        let areas = self.facets.normals.iter().zip(&self.facets.areas);
+        areas.zip(visible).map(move |((n, area), visible)| f64::from(visible * n.dot(o).max(0.0) * area))
+    }
+
+    /// The mean height of facets that are visible, lit and reflect [deviations].
+    fn mean_height(&self, i: Vec3, o: Vec3) -> f64 {
+        let height = Source::Height { noise: 0.0 };
+        let (mut sum, mut total) = (0.0, 0.0);
+        for (point, weight) in self.points.iter().zip(self.weights(i, o).reflected) {
+            let weight = weight.dot(LUMINANCE.as_dvec3());
+            sum += weight * height.value(point, &self.map.relief);
+            total += weight;
+        }
+        if total > 0.0 { sum / total } else { 0.0 }
     }
 
     fn weights(&self, i: Vec3, o: Vec3) -> FacetWeights {
@@ -309,8 +299,8 @@ impl ColorFilter {
                 // point is dark.
                 lit += f64::from(area * n.dot(o).max(0.0) * v_o[s].min(v_i[s]));
             }
-            let f = (material.brdf.f(n, i, o) * material.color).dot(LUMINANCE);
-            reflected.push(f64::from(area * v_i[s] * v_o[s] * f));
+            let f = material.brdf.f(n, i, o) * material.color;
+            reflected.push((f * (area * v_i[s] * v_o[s])).as_dvec3());
         }
         FacetWeights { reflected, lit: if seen > 0.0 { lit / seen } else { 0.0 } }
     }
@@ -374,7 +364,7 @@ const SMITH_CHECK: [[f64; 2]; 2] = [[0.9, 1.6], [1.3, 0.0]];
 /// Weights of facets at a pair of directions.
 struct FacetWeights {
     /// Reflection of each facet from the light to the viewer.
-    reflected: Vec<f64>,
+    reflected: Vec<DVec3>,
     /// Lit part of what is seen.
     lit: f64,
 }

@@ -149,7 +149,6 @@ impl Pipeline {
             MeasureRelief::NAME,
             ColorTile::NAME,
             ColorFacets::NAME,
-            stages::MeasureHeights::NAME,
         ];
         names.into_iter().map(|name| (name, self.memo.runs(name))).collect()
     }

@@ -3,7 +3,6 @@
 mod grid;
 mod histogram;
 mod levels;
-mod measured;
 mod mips;
 mod noise;
 pub mod place;
@@ -11,7 +10,6 @@ pub mod place;
 pub use grid::DriverGrid;
 pub use histogram::{HistogramMips, MIN_DEVIATION};
 pub use levels::{LOW_PASS, LevelAt, Levels};
-pub use measured::RankedHeights;
 pub use mips::{MomentMips, principal};
 pub use noise::residual_variance;
 pub use place::{Footprint, PlaceDriver, PlaceMap};

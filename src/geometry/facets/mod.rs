@@ -55,6 +55,11 @@ impl Facets {
         self.positions.is_empty()
     }
 
+    /// Normals by which a colour map colours facets of this mesh: bins change only those that reflect.
+    pub fn coloring_normals(&self, mesh: &TileMesh) -> &[Vec3] {
+        if mesh.corner_normals.is_some() { &self.normals } else { &self.geometric_normals }
+    }
+
     /// Returns true if a part of the surface has many more facets than its area asks for, because it is small, but may reflect
     /// much.
     pub fn has_rare_part(&self) -> bool {

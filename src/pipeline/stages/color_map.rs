@@ -6,13 +6,11 @@ use std::sync::Arc;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::tile::hash_sampling_into;
 use super::{FacetsRole, TileShape};
 use crate::base::Result;
 use crate::cache::{Key, KeyBuilder};
-use crate::color_map::Normal;
 use crate::color_map::layers::{LayeredMap, Relief};
-use crate::color_map::statistics::{DriverGrid, PlaceDriver, RankedHeights};
+use crate::color_map::statistics::{DriverGrid, PlaceDriver};
 use crate::effective::mean_colors;
 use crate::geometry::relief::{relief, relief_of_surface};
 use crate::geometry::{ColorField, Facets, image_file};
@@ -155,40 +153,12 @@ impl Stage for ColorFacets<'_> {
     fn run(&self, _: &Env) -> Result<Facets> {
         let mesh = &self.tile.mesh;
         let mut facets = (*self.facets.value).clone();
-        // Bins change the normals that reflect, but not those by which a map colours.
-        let normals = if mesh.corner_normals.is_some() { &facets.normals } else { &facets.geometric_normals };
         let color = |(position, normal): (&Vec3, &Vec3)| mesh.color.at(*position, *normal, mesh.size);
-        facets.colors = facets.positions.par_iter().zip(normals).with_min_len(512).map(color).collect();
+        let points = facets.positions.par_iter().zip(facets.coloring_normals(mesh));
+        facets.colors = points.with_min_len(512).map(color).collect();
         if self.settings.effects.color_weights == Switch::Off {
             mean_colors(&mut facets);
         }
         Ok(facets)
-    }
-}
-
-/// Ranks the heights of the facets. Neither stops nor visibility are inputs.
-pub struct MeasureHeights<'a> {
-    pub tile: &'a Keyed<TileShape>,
-    pub facets: &'a Keyed<Facets>,
-    pub settings: &'a Settings,
-}
-
-impl Stage for MeasureHeights<'_> {
-    type Output = RankedHeights;
-    const NAME: &'static str = "color_heights";
-
-    fn hash_into(&self, key: &mut KeyBuilder) {
-        key.key("surface", &self.tile.placing_key());
-        hash_sampling_into(self.settings, key);
-    }
-
-    fn run(&self, _: &Env) -> Result<RankedHeights> {
-        let Normal { mean, deviation } = relief(&self.tile.mesh).height;
-        let scale = if deviation > 0.0 { deviation.recip() } else { 0.0 };
-        let standard = |position: &Vec3| ((f64::from(position.z) - mean) * scale) as f32;
-        let heights: Vec<f32> = self.facets.positions.iter().map(standard).collect();
-        let projected = |(normal, area): (&Vec3, &f32)| normal.z.abs() * area;
-        let areas: Vec<f32> = self.facets.geometric_normals.iter().zip(&self.facets.areas).map(projected).collect();
-        Ok(RankedHeights::new(&heights, &areas))
     }
 }

@@ -8,7 +8,7 @@ mod slab;
 mod tile;
 mod visibility;
 
-pub(super) use color_map::{ColorFacets, ColorTile, MeasureHeights, MeasureRelief, SampleDrivers};
+pub(super) use color_map::{ColorFacets, ColorTile, MeasureRelief, SampleDrivers};
 pub(super) use factors::{Factorize, LookUpVisibility, TabulateFactors, TabulateForCheck};
 pub(super) use interreflection::{
     CastTransport, FindMirrorPlanes, Interreflect, MeasureBouncedShare, PrepareSamplers, Reflection,

@@ -76,7 +76,7 @@ scene_table! {
     ColorMap {
         /// Combination of the layers: sum or product.
         combine: Combine = Combine::Sum, FieldShape::Choice(Combine::NAMES), "";
-        /// Distribution of heights that are seen and lit: measured, smith or paper.
+        /// Distribution of heights and slopes that are seen and lit: measured on the facets, smith or paper.
         distribution: HeightDistribution = HeightDistribution::Measured, FieldShape::Choice(HeightDistribution::NAMES), "";
         /// Ranks make a texture's values normal before its moments are taken: auto, on or off.
         gaussianize: Gaussianize = Gaussianize::Auto, FieldShape::Choice(Gaussianize::NAMES), "";
