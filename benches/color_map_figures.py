@@ -3,11 +3,13 @@
     python benches/color_map_figures.py [NAME ...]
 
 Without names it makes all figures: comparisons, heights, footprints, zoom. It takes minutes, most of them for the truth, and needs
-ImageMagick's `montage`. It writes to docs/color_maps/ and docs/color_maps_zoom.png.
+ImageMagick's `montage`. It writes to docs/color_maps/ and docs/color_maps_zoom.png, and the errors of the comparisons to
+docs/measurements/color_maps.md.
 """
 
 import csv
 import io
+import json
 import math
 import os
 import random
@@ -21,6 +23,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 BISCALE = os.environ.get("BISCALE", ROOT / "target/release/biscale")
 OUT = ROOT / "docs/color_maps"
+PAGE = ROOT / "docs/measurements/color_maps.md"
 COMPARED = ["fig1a_noise", "fig1b_heights", "fig1c_slopes", "fig5_structures", "fig6_non_normal", "fig8a_bear_heights",
             "fig8b_bear_slopes", "fig9_slopes", "fig10_snake", "fig11_scales"]
 COLORS = ["#c0392b", "#2471a3", "#1e8449", "#7d3c98"]
@@ -74,8 +77,18 @@ def plot(path, title, x_label, y_label, lines, points=(), log=False, legend=(72,
 
 
 def comparisons():
+    """Writes the images and the table of their errors."""
+    rows = []
     for name in COMPARED:
-        biscale("filter", f"{name}_color_map", "--side-by-side", OUT / f"{name}.png")
+        command = [BISCALE, "filter", f"{name}_color_map", "--side-by-side", OUT / f"{name}.png", "--json", "--no-cache", "--quiet"]
+        printed = subprocess.run([*map(str, command)], check=True, capture_output=True, text=True).stdout
+        of = {row["method"]: row for row in json.loads(printed)["side_by_side"]}
+        rows.append(f"| `{name}_color_map` | {of['naive']['rms']:.4f} | {of['filtered']['rms']:.4f} |")
+    commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, check=True, capture_output=True, text=True).stdout.strip()
+    table = "\n".join(["| scene | naive | filtered |", "|---|---|---|", *rows, "", f"commit {commit}"])
+    text = PAGE.read_text()
+    start = text.index("<!-- comparisons -->\n") + len("<!-- comparisons -->\n")
+    PAGE.write_text(text[:start] + table + text[text.index("\n<!-- end -->", start):])
 
 
 def gaussian_heights(path, side=192, cells=16, waves=240):

@@ -300,21 +300,13 @@ fn the_table_of_color_maps_against_the_core() {
         |name: &'static str, preset: &'static str, map: String| (name, preset, hills_under_ripples(384, preset, &map));
     let steepness = "{ kind = \"steepness\" }";
     let rows = [
-        of_tile("heights, bands, measured", "standard", of("measured", height, BANDS)),
         of_tile("heights, bands, smith", "standard", of("smith", height, BANDS)),
         of_tile("heights, ramp, smith", "standard", of("smith", height, RAMP)),
         of_tile("heights, bands, paper", "standard", of("paper", height, BANDS)),
-        of_hills("hills under ripples, heights, bands, measured", "standard", of("measured", height, BANDS)),
         of_hills("hills under ripples, heights, bands, smith", "standard", of("smith", height, BANDS)),
         of_hills("hills under ripples, heights, bands, smith", "fine", of("smith", height, BANDS)),
-        of_tile("slopes, bands, diffuse, measured", "standard", of("measured", slope, BANDS)),
         of_tile("slopes, bands, diffuse, smith", "standard", of("smith", slope, BANDS)),
         of_tile("slopes, bands, diffuse, paper", "standard", of("paper", slope, BANDS)),
-        of_tile(
-            "slopes, bands, Cook-Torrance 0.15, measured",
-            "standard",
-            format!("{glossy}{}", of("measured", slope, BANDS)),
-        ),
         of_tile(
             "slopes, bands, Cook-Torrance 0.15, smith",
             "standard",
