@@ -137,7 +137,7 @@ fn pairs_by_walks_agree_with_counted_photons_and_with_the_sum_of_facets() {
         [(beckmann(0.3), uneven.clone()), (uneven, flat), (half_level.clone(), beckmann(0.3)), (ggx(0.3), half_level)]
     {
         let slab = slab(&top, &bottom);
-        let lobe = truth(&slab, 50.0, 2_000_000);
+        let lobe = truth(&slab, 50.0, 1_000_000);
         let side = lobe.side;
         // Blocks of eight by eight cells around the lobe, each by one pair in the middle of each cell.
         for (x, y) in [(16, 40), (8, 48), (32, 40), (48, 48)] {
@@ -147,7 +147,7 @@ fn pairs_by_walks_agree_with_counted_photons_and_with_the_sum_of_facets() {
                 at.extend(-(1.0 - at.length_squared()).max(0.0).sqrt())
             };
             let pairs: Vec<_> = cells.iter().map(|cell| (polar(50.0), direction(*cell))).collect();
-            let settings = PairSettings { walks: 8192, target: 0.0, bounces: true, seed: 3 };
+            let settings = PairSettings { walks: 4096, target: 0.0, bounces: true, seed: 3 };
             let truth =
                 PairTruth::of_pairs((&top, &bottom), &slab.optics, &pairs, &settings, &Cancel::default()).unwrap();
             let cosine = polar(50.0).z;
