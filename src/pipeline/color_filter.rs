@@ -31,7 +31,7 @@ pub struct ColorFilter {
     spec: ColorMap,
     facets: Arc<Facets>,
     visibility: Arc<Visibility>,
-    /// What the map colours each facet by.
+    /// Place, height and slope of each facet, by which the map colours it.
     points: Vec<SurfacePoint>,
     materials: Vec<Material>,
     material_of_slot: Vec<usize>,

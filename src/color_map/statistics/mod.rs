@@ -1,4 +1,4 @@
-//! Statistics of drivers: noise, moments over footprints, and moments of what is seen and lit.
+//! Statistics of drivers: noise, and moments and ranks of values over footprints.
 
 mod grid;
 mod histogram;
