@@ -4,6 +4,7 @@
 //!import shading_points
 //!import shadows_none
 //!import polar_grid
+//!import cubic
 //!import column_tints
 
 // Groups of four columns per node, and whether interpolation along θ_d is cubic.
@@ -82,9 +83,7 @@ fn table_taps(i: vec3f, o: vec3f) -> TableTaps {
     let t = theta_d - f32(low_theta_d);
     taps.along = vec4f(0.0, 1.0 - t, t, 0.0);
     if CUBIC {
-        let t2 = t * t;
-        let t3 = t2 * t;
-        taps.along = 0.5 * vec4f(2.0 * t2 - t - t3, 2.0 - 5.0 * t2 + 3.0 * t3, t + 4.0 * t2 - 3.0 * t3, t3 - t2);
+        taps.along = cubic_weights(t);
     }
     taps.i_dot_h = min(d.z, 1.0);
     return taps;

@@ -81,6 +81,15 @@ impl InterreflectionTable {
         size_of_val(self.rows.as_slice())
     }
 
+    /// The rows as red, green, blue and zero, row by row: for each `o`, the rings of `i`, each followed by its first
+    /// [`REPEATED`] azimuths.
+    #[cfg(feature = "gpu")]
+    pub fn rgb_rows(&self) -> Vec<[f32; 4]> {
+        let plane = plane_length(self.grid);
+        let of_row = |row: &[f32]| (0..plane).map(|at| [row[at], row[plane + at], row[2 * plane + at], 0.0]).collect();
+        self.rows.chunks(3 * plane).flat_map(|row| -> Vec<_> { of_row(row) }).collect()
+    }
+
     /// Calls `out` with the index and `G_indirect(i, o)` [1/sr] of each light; 0 if a direction is at or below the
     /// horizon. The values do not depend on which lights are asked for together.
     pub fn eval_lights(&self, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) {

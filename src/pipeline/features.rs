@@ -29,14 +29,12 @@ impl Pipeline {
     /// The properties that take no rays: mirror planes and bounced light are not looked for.
     pub(super) fn features(&self, surface: &Surface<'_>) -> Result<SceneFeatures> {
         let Surface { scene, tile, facets, sum, materials, settings, .. } = *surface;
-        let needs_maps = !tile.flat && (!tile.height_field || settings.visibility_method != VisibilityMethod::Auto);
-        let gpu_allowed = needs_maps && settings.backend != Backend::Cpu;
-        let gpu = if gpu_allowed { self.env.gpu() } else { None };
-        // Software Vulkan draws shadow maps far slower than the CPU slices (the draft of the pillow: 78 s instead of
-        // 0.1 s), so that it is used only if both the GPU and maps are asked for.
-        let asked = settings.backend == Backend::Gpu && settings.visibility_method == VisibilityMethod::Maps;
-        let hardware_gpu = gpu.is_some_and(|gpu| asked || gpu.is_hardware());
-        let scan_work = if surface.wants_scan_work && needs_maps && !hardware_gpu {
+        let is_sliced = !tile.flat && (!tile.height_field || settings.visibility_method != VisibilityMethod::Auto);
+        let draws_maps = !tile.flat && settings.visibility_method == VisibilityMethod::Maps;
+        let gpu = if draws_maps && settings.backend != Backend::Cpu { self.env.gpu() } else { None };
+        // Software Vulkan draws shadow maps far slower than the CPU, so that it is used only if a GPU is asked for.
+        let maps_on_gpu = gpu.is_some_and(|gpu| settings.backend == Backend::Gpu || gpu.is_hardware());
+        let scan_work = if surface.wants_scan_work && is_sliced && !maps_on_gpu {
             *self.get(EstimateScanWork { tile, facets }, &mut StageTimes::new())?
         } else {
             0.0
@@ -56,7 +54,7 @@ impl Pipeline {
             height_samples: tile.mesh.height_grid.is_some(),
             height_field: tile.height_field,
             closes_plane: tile.mesh.closes_plane,
-            hardware_gpu,
+            maps_on_gpu,
             triangles: tile.mesh.triangles.len(),
             scan_work,
             area_ratio: facets.areas.iter().map(|area| f64::from(*area)).sum::<f64>()

@@ -20,19 +20,18 @@ pub enum VisibilityAlgorithm {
 }
 
 impl VisibilityAlgorithm {
-    /// The algorithm for a scene. Shadow maps on the CPU must be asked for: between their directions the error is large
-    /// where light passes small holes, and no estimate shows it.
+    /// The algorithm for a scene. Shadow maps must be asked for: between their directions the error is large where light
+    /// passes small holes, and no estimate shows it. A GPU draws them more slowly than a CPU cuts slices.
     pub(super) fn choose(features: &SceneFeatures, settings: &Settings) -> Self {
         if !is_on(settings.effects.visibility, !features.flat && !is_shallow(features, settings)) {
             return Self::None;
         }
-        let maps = if features.hardware_gpu { Self::GpuMaps } else { Self::CpuMaps };
         match settings.visibility_method {
             VisibilityMethod::OcclusionIntervals => Self::OcclusionIntervals,
-            VisibilityMethod::Maps => maps,
+            VisibilityMethod::Maps if features.maps_on_gpu => Self::GpuMaps,
+            VisibilityMethod::Maps => Self::CpuMaps,
             VisibilityMethod::Auto if features.height_samples => Self::HeightMarch,
             VisibilityMethod::Auto if features.height_field => Self::HorizonScan,
-            VisibilityMethod::Auto if features.hardware_gpu => Self::GpuMaps,
             VisibilityMethod::Auto => Self::OcclusionIntervals,
         }
     }

@@ -21,7 +21,8 @@ pub struct SceneFeatures {
     pub height_samples: bool,
     pub height_field: bool,
     pub closes_plane: bool,
-    pub hardware_gpu: bool,
+    /// True if a GPU draws shadow maps.
+    pub maps_on_gpu: bool,
     pub triangles: usize,
     /// Cells and triangles that one slice of the mesh visits.
     pub scan_work: f64,

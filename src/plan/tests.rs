@@ -124,7 +124,7 @@ fn features() -> SceneFeatures {
         height_samples: false,
         height_field: true,
         closes_plane: true,
-        hardware_gpu: false,
+        maps_on_gpu: false,
         triangles: 64,
         scan_work: 10.0,
         area_ratio: 1.2,

@@ -38,7 +38,7 @@ scene_table! {
         /// Number of elevation rings at which visibility is computed.
         #[serde(skip_serializing_if = "Option::is_none")]
         rings: Option<usize> = None, FieldShape::Integer { min: 2, max: 512 }, "";
-        /// Visibility method: auto (a horizon map if nothing overhangs; else shadow maps on a hardware GPU, else slices), slices or maps.
+        /// Visibility method: auto (a horizon map if nothing overhangs, else slices), slices or maps.
         #[serde(skip_serializing_if = "Option::is_none")]
         visibility: Option<String> = None, FieldShape::Choice(VISIBILITIES), "";
         /// Number of bins over the sphere of normals; facets of one bin share one lobe. Empty: no bins.

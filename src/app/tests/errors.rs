@@ -69,6 +69,9 @@ fn on_gpu(document: &Document) -> crate::scene::Scene {
 fn an_image_on_the_window_s_gpu_is_displayed_without_readback_and_equals_that_of_the_cpu() {
     let Some(screen) = screen() else { return };
     let mut harness = harness(quick());
+    // So small that the CPU renders as many pixels as a GPU.
+    harness.set_size(egui::vec2(1100.0, 800.0));
+    harness.step();
     settle(&mut harness);
     let cpu = editor(&mut harness).object.preview.as_ref().unwrap().image.clone();
     assert!(matches!(cpu, DisplayImage::Pixels(_)));

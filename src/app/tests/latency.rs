@@ -27,7 +27,7 @@ fn opened(name: &str) -> Harness<'static, Option<Editor>> {
     let mut harness = harness(Document::open(name).unwrap());
     harness.set_size(eframe::egui::vec2(1440.0, 900.0));
     let mut scene = (**editor(&mut harness).document.scene()).clone();
-    "cpu".clone_into(&mut scene.quality.backend);
+    "auto".clone_into(&mut scene.quality.backend);
     editor(&mut harness).document.edit(scene);
     harness.step();
     let opened = Instant::now();

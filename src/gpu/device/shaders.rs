@@ -17,7 +17,7 @@ macro_rules! shaders {
 
 /// Name and source of every file in the folders of `shaders/`. Names are unique across folders.
 pub const SHADERS: &[(&str, &str)] = shaders! {
-    "common": "angles", "flat_index", "point", "polar_grid", "vectors", "workgroup_sum";
+    "common": "angles", "cubic", "flat_index", "point", "polar_grid", "vectors", "workgroup_sum";
     "lobes": "blinn_phong", "cook_torrance", "exp_negative", "ggx", "lambertian", "lobe_angles",
         "lobe_blinn_phong", "lobe_by_number", "lobe_cook_torrance", "lobe_ggx", "lobe_lambertian", "lobe_ward",
         "tint_fixed", "tint_fresnel", "tint_row", "ward";
@@ -26,7 +26,7 @@ pub const SHADERS: &[(&str, &str)] = shaders! {
         "visibility_packed_intervals", "visibility_unblocked";
     "shading": "bounds_horizons", "bounds_unblocked", "bounds_unknown", "cluster_sums", "clusters",
         "column_lobes", "column_tints", "facets", "horizon_bounds", "projected_area", "scales",
-        "shade_clusters", "shade_direct", "shade_low_rank", "shade_table", "shading_points", "shadows_bits",
+        "shade_bounced", "shade_clusters", "shade_direct", "shade_low_rank", "shade_table", "shading_points", "shadows_bits",
         "shadows_none", "sum_areas", "sum_cluster_areas", "sum_facets", "sum_visible_areas", "weights_area",
         "weights_rgb";
     "tabulate": "facet_subsets", "sample_facets", "table_areas", "table_borders", "table_nodes",

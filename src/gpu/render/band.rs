@@ -1,9 +1,12 @@
-//! GPU buffers of one image: its samples, and the points of a band of its rows.
+//! GPU buffers of one image: its samples, and the points of bands of its rows.
 //!
-//! Bands use the same buffers in turn, so that memory is bounded. The parameters of each band are in small uniform
-//! blocks of its own, which are written before the submission.
+//! Bands use the same buffers in turn, so that memory is bounded; only points and light visibility have buffers for
+//! each band if all fit. The parameters of each band are in small uniform blocks of its own, which are written before
+//! the submission.
 
 use std::ops::Range;
+
+use glam::Vec3;
 
 use super::gbuffer::{GpuCamera, GpuGBuffer, GpuObject, GpuPoint, GpuSamples};
 use super::image;
@@ -12,8 +15,9 @@ use super::light_rays::{GpuLightRays, GpuOccluder};
 use crate::gpu::shading::{GpuLight, GpuShading, MAX_POINTS};
 use crate::gpu::{Gpu, GpuError, Tier, shading};
 use crate::render::shadow::LightVisibility;
+use crate::render::{CameraView, DirectionalLight};
 
-/// Largest size of the buffers that bands share, in bytes.
+/// Largest size of the buffers that bands share, in bytes; also of the points and the light visibility of all bands.
 const BAND_BYTES: usize = 256 << 20;
 /// Number of threads that keeps a GPU busy. Images with that many points need no slices of the lights.
 const BUSY_THREADS: usize = 1 << 20;
@@ -53,10 +57,18 @@ pub(super) struct RenderBuffers {
     /// Points of the last band, and the starts of their shadow rays.
     #[cfg(test)]
     pub points_and_origins: [wgpu::Buffer; 2],
-    /// Bindings of the samples, the points and the starts of shadow rays.
-    pub to_points: wgpu::BindGroup,
-    pub to_bits: Option<wgpu::BindGroup>,
+    /// True if each band has buffers for its points and for their light visibility.
+    keeps_points: bool,
+    /// View and directions of the lights for which the bands hold points and light visibility.
+    found_for: Option<(CameraView, Vec<Vec3>)>,
     pub bands: Vec<Band>,
+}
+
+/// Points and their light visibility.
+#[derive(Clone)]
+struct PointBuffers {
+    points: wgpu::Buffer,
+    bits: wgpu::Buffer,
 }
 
 /// A band of rows of pixels.
@@ -67,7 +79,10 @@ pub(super) struct Band {
     params: wgpu::Buffer,
     image: wgpu::Buffer,
     pub scene: wgpu::BindGroup,
+    /// Bindings of the samples, the points and the starts of shadow rays.
+    pub to_points: wgpu::BindGroup,
     pub rays: Option<wgpu::BindGroup>,
+    pub to_bits: Option<wgpu::BindGroup>,
     pub shading: wgpu::BindGroup,
     pub pixels: wgpu::BindGroup,
 }
@@ -101,23 +116,33 @@ impl RenderBuffers {
         let samples = GpuSamples::new(gpu, sizes.size.map(|side| side * sizes.samples_per_side))?;
         let buffer = |label, bytes| gpu.buffer(label, bytes, Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC);
         let lights = buffer("lights", (size_of::<GpuLight>() * sizes.lights) as u64)?;
-        let points = buffer("shading points", size_of::<GpuPoint>() as u64 * max_points)?;
         let origins = buffer("origins of rays", if shadowed { 16 * max_points } else { 0 })?;
-        let bits = buffer("light visibility", 4 * words as u64 * max_points)?;
+        let point_buffers = |count: u64| -> Result<PointBuffers, GpuError> {
+            Ok(PointBuffers {
+                points: buffer("shading points", size_of::<GpuPoint>() as u64 * count)?,
+                bits: buffer("light visibility", 4 * words as u64 * count)?,
+            })
+        };
+        let keeps_points = height * points_per_row * (size_of::<GpuPoint>() + 4 * words) <= BAND_BYTES;
+        let of_last_band = point_buffers(max_points)?;
         let radiance = buffer("radiance", 16 * slices as u64 * max_points)?;
         let scales = buffer("scales", 4 * max_points)?;
-        let to_bits = parts.rays.map(|(rays, occluder)| rays.rays(gpu, occluder, &origins, &bits)).transpose()?;
         let bands = (0..height).step_by(rows).map(|first| {
+            let PointBuffers { points, bits } =
+                if keeps_points && first + rows < height { point_buffers(max_points)? } else { of_last_band.clone() };
             let uniform = |label, bytes: usize| gpu.buffer(label, bytes as u64, Usage::UNIFORM | Usage::COPY_DST);
             let camera = uniform("camera", size_of::<GpuCamera>())?;
             let params = uniform("parameters", size_of::<shading::ShadingParams>())?;
             let image = uniform("image", size_of::<image::ImageParams>())?;
             let rays = parts.rays.map(|(rays, _)| rays.points(gpu, [&params, &points, &lights]));
+            let to_bits = parts.rays.map(|(rays, occluder)| rays.rays(gpu, occluder, &origins, &bits));
             let shading = [&params, &points, &lights, &bits, &radiance, &scales];
             Ok(Band {
                 rows: first..(first + rows).min(height),
                 scene: parts.gbuffer.scene(gpu, parts.object, &camera)?,
+                to_points: parts.gbuffer.samples(gpu, &samples, &points, &origins)?,
                 rays: rays.transpose()?,
+                to_bits: to_bits.transpose()?,
                 shading: parts.shading.points(gpu, shading)?,
                 pixels: parts.images.points(gpu, [&image, &points, &radiance])?,
                 camera,
@@ -126,7 +151,6 @@ impl RenderBuffers {
             })
         });
         let bands = bands.collect::<Result<_, GpuError>>()?;
-        let to_points = parts.gbuffer.samples(gpu, &samples, &points, &origins)?;
         let [slice, slices, words] = [slice, slices, words].map(|n| n as u32);
         Ok(Self {
             sizes,
@@ -137,11 +161,23 @@ impl RenderBuffers {
             lights,
             radiance,
             #[cfg(test)]
-            points_and_origins: [points, origins],
-            to_points,
-            to_bits,
+            points_and_origins: [of_last_band.points, origins],
+            keeps_points,
+            found_for: None,
             bands,
         })
+    }
+
+    /// Returns true if the buffers hold the points and the light visibility of this view under these lights.
+    pub fn holds(&self, view: &CameraView, lights: &[DirectionalLight]) -> bool {
+        self.found_for.as_ref().is_some_and(|(of, directions)| {
+            of == view && directions.iter().eq(lights.iter().map(|light| &light.direction))
+        })
+    }
+
+    /// Records that points and light visibility of this view were computed.
+    pub fn set_found(&mut self, view: CameraView, lights: &[DirectionalLight]) {
+        self.found_for = self.keeps_points.then(|| (view, lights.iter().map(|light| light.direction).collect()));
     }
 
     /// Returns the number of point slots per pixel.

@@ -202,7 +202,8 @@ impl GpuRenderer {
             lights: input.lights.len(),
             points,
         };
-        let buffers = self.buffers(gpu, sizes)?;
+        let mut buffers = self.buffers(gpu, sizes)?;
+        let finds_points = !buffers.holds(&view, input.lights);
         let lights: Vec<GpuLight> = input.lights.iter().map(GpuLight::from).collect();
         gpu.write(&buffers.lights, &lights)?;
         for band in &buffers.bands {
@@ -226,14 +227,22 @@ impl GpuRenderer {
         for (first, bands) in buffers.bands.chunks(bands_per_submission).enumerate() {
             cancel.check()?;
             if first == 0 {
-                self.record_preparation(&mut recorder, &buffers, cancel)?;
+                self.record_preparation(&mut recorder, cancel)?;
+                if let (true, Some(band)) = (finds_points, buffers.bands.first()) {
+                    let (encoder, writes) = recorder.render_pass(GpuPassKind::GBuffer);
+                    self.gbuffer.draw(encoder, &buffers.samples, &band.scene, &self.object, writes);
+                }
             }
             for band in bands {
+                if finds_points {
+                    self.record_points(&mut recorder, &buffers, band)?;
+                }
                 self.record_band(&mut recorder, &buffers, band, (output, &group), work_per_band > self.max_work)?;
             }
             recorder.submit()?;
         }
         let times = recorder.times();
+        buffers.set_found(view, input.lights);
         (self.buffers, self.is_prepared) = (Some(buffers), true);
         Ok(times)
     }
@@ -249,8 +258,8 @@ impl GpuRenderer {
         }
     }
 
-    /// Records the work before all bands: the inputs of the material if they are not yet computed, and the samples.
-    fn record_preparation(&self, recorder: &mut Recorder, buffers: &RenderBuffers, cancel: &Cancel) -> Result<()> {
+    /// Records the inputs of the material if they are not yet computed.
+    fn record_preparation(&self, recorder: &mut Recorder, cancel: &Cancel) -> Result<()> {
         let unprepared = self.material.as_ref().filter(|_| !self.is_prepared);
         if let Some(maps) = unprepared.and_then(GpuMaterial::maps) {
             for (submission, batches) in maps.batches().enumerate() {
@@ -289,14 +298,32 @@ impl GpuRenderer {
                 }
             }
         }
-        if let Some(band) = buffers.bands.first() {
-            let (encoder, writes) = recorder.render_pass(GpuPassKind::GBuffer);
-            self.gbuffer.draw(encoder, &buffers.samples, &band.scene, &self.object, writes);
+        Ok(())
+    }
+
+    /// Records the points of a band, from its samples, and their light visibility.
+    fn record_points(
+        &self,
+        recorder: &mut Recorder,
+        buffers: &RenderBuffers,
+        band: &Band,
+    ) -> std::result::Result<(), GpuError> {
+        let pixels = [buffers.sizes.size[0], band.rows.len()].map(|n| n as u32);
+        let mut pass = recorder.compute_pass(GpuPassKind::GBuffer, &[]);
+        self.gbuffer.find_points(&mut pass, &band.scene, &band.to_points, pixels);
+        drop(pass);
+        recorder.end_stage(GpuPassKind::GBuffer)?;
+        let rays = self.rays.as_ref().filter(|_| buffers.sizes.lights > 0);
+        if let (Some((rays, _)), Some(group), Some(to_bits)) = (rays, &band.rays, &band.to_bits) {
+            let mut pass = recorder.compute_pass(GpuPassKind::Shadows, &[]);
+            rays.trace(&mut pass, group, to_bits, [buffers.point_slots(band), buffers.words]);
+            drop(pass);
+            recorder.end_stage(GpuPassKind::Shadows)?;
         }
         Ok(())
     }
 
-    /// Records the work of a band, from samples to pixels.
+    /// Records the work of a band from points to pixels.
     fn record_band(
         &self,
         recorder: &mut Recorder,
@@ -306,17 +333,7 @@ impl GpuRenderer {
         is_heavy: bool,
     ) -> std::result::Result<(), GpuError> {
         let (points, pixels) = (buffers.point_slots(band), [buffers.sizes.size[0], band.rows.len()].map(|n| n as u32));
-        let mut pass = recorder.compute_pass(GpuPassKind::GBuffer, &[]);
-        self.gbuffer.find_points(&mut pass, &band.scene, &buffers.to_points, pixels);
-        drop(pass);
-        recorder.end_stage(GpuPassKind::GBuffer)?;
         let lit = buffers.sizes.lights > 0;
-        if let (true, Some((rays, _)), Some(group), Some(to_bits)) = (lit, &self.rays, &band.rays, &buffers.to_bits) {
-            let mut pass = recorder.compute_pass(GpuPassKind::Shadows, &[]);
-            rays.trace(&mut pass, group, to_bits, [points, buffers.words]);
-            drop(pass);
-            recorder.end_stage(GpuPassKind::Shadows)?;
-        }
         let passes = self.material.as_ref().filter(|_| lit).map_or(0, GpuMaterial::passes);
         // The work of a single row of pixels may exceed that of a submission.
         let passes_at_once = if is_heavy { 1 } else { passes.max(1) };

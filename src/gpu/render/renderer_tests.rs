@@ -3,11 +3,11 @@
 use glam::Vec3;
 
 use crate::base::Cancel;
-use crate::effective::{Black, GpuVisibilityInput, Representation, ShadingTable};
-use crate::gpu::GpuRenderer;
+use crate::effective::{Black, EffectiveBrdf, GpuVisibilityInput, Representation, ShadingTable};
 use crate::gpu::shading::tests::{
     FLAT, LOBES, PYRAMIDS, RODS, TestScene, assert_same_image, effective, open, open_gpu,
 };
+use crate::gpu::{GpuRenderer, render_gpu};
 use crate::pipeline::Pipeline;
 use crate::render::image::shading::ImageBackground;
 use crate::render::image::tone_map::ToneMap;
@@ -109,7 +109,7 @@ fn an_image_in_many_bands_and_submissions_has_the_same_bits() {
     let whole = renderer.render(&gpu, &input, &Cancel::default()).unwrap();
     assert_eq!(bands(&renderer), 1);
     // Three rows at a time, the last two by themselves.
-    renderer.max_work = renderer.max_work / bands(&renderer) as u64 / 1000;
+    renderer.max_work = 1 << 19;
     let cut = renderer.render(&gpu, &input, &Cancel::default()).unwrap();
     assert!(bands(&renderer) > 10, "{}", bands(&renderer));
     assert_eq!((&cut.image, cut.points), (&whole.image, whole.points));
@@ -120,6 +120,33 @@ fn an_image_in_many_bands_and_submissions_has_the_same_bits() {
     // A silhouette may lie on the other side of a sample.
     let points = render(&input).unwrap().points;
     assert!(cut.points.abs_diff(points) * 100 < points, "{} and the CPU's {points}", cut.points);
+}
+
+#[test]
+fn points_and_shadows_are_computed_again_only_if_the_view_or_the_lights_change() {
+    let Some(gpu) = open_gpu() else { return };
+    let [first, second] = [LOBES[4], LOBES[0]].map(|lobe| effective(&open(PYRAMIDS, lobe, "direct")));
+    let mut test_scene = TestScene::of("cup");
+    let mut renderer =
+        GpuRenderer::with_material(&gpu, &test_scene.mesh, test_scene.occluder.as_ref(), &first).unwrap();
+    // Several bands, each with its own points.
+    renderer.max_work = 1 << 20;
+    let mut rendered = |test_scene: &TestScene, brdf: &EffectiveBrdf| {
+        let input = test_scene.input(brdf, 50, &ImageBackground::Wall);
+        renderer.set_brdf(&gpu, brdf).unwrap();
+        let rendered = renderer.render(&gpu, &input, &Cancel::default()).unwrap();
+        assert_eq!(rendered.image, render_gpu(&gpu, &input, brdf).unwrap().image);
+        assert!(renderer.buffers.as_ref().unwrap().bands.len() > 2);
+        rendered.times.gbuffer_ms + rendered.times.shadows_ms > 0.0
+    };
+    assert!(rendered(&test_scene, &first));
+    assert!(!rendered(&test_scene, &second), "another material");
+    test_scene.lights.iter_mut().for_each(|light| light.irradiance *= 2.0);
+    assert!(!rendered(&test_scene, &second), "brighter lights");
+    test_scene.camera.azimuth_deg += 40.0;
+    assert!(rendered(&test_scene, &second), "another view");
+    test_scene.lights[3].direction = Vec3::X;
+    assert!(rendered(&test_scene, &first), "another light");
 }
 
 #[test]

@@ -15,7 +15,7 @@ use crate::pipeline::Pipeline;
 use crate::render::image::raster::NO_TRIANGLE;
 use crate::render::image::shading::ImageBackground;
 use crate::render::image::shading_points::ShadingPoints;
-use crate::render::image::tone_map::{ToneCurve, ToneMap, srgb_byte};
+use crate::render::image::tone_map::{ToneCurve, ToneMap, srgb};
 use crate::render::shadow::{LightVisibility, Occluder, ray_origin};
 use crate::render::{CameraView, DirectionalLight, GBuffer, ObjectMesh, RenderInput, object};
 use crate::scene;
@@ -210,15 +210,12 @@ fn an_image_for_a_screen_is_the_tone_mapped_image_that_is_read_back() {
         let image = renderer.render(&gpu, &input, &Cancel::default()).unwrap().image;
         renderer.show(&gpu, &input, &tone_map, &view, &Cancel::default()).unwrap();
         let shown_image = gpu.read_image(&texture).unwrap();
-        let bytes = image.pixels.iter().map(|pixel| tone_map.apply(*pixel).to_array().map(srgb_byte));
-        let mut off = 0;
-        for (k, (bytes, shown)) in bytes.zip(shown_image.as_chunks::<4>().0).enumerate() {
-            let difference = (0..3).map(|c| bytes[c].abs_diff(shown[c])).max();
-            assert!(difference <= Some(1) && shown[3] == 255, "{k}: {bytes:?} {shown:?}");
-            off += usize::from(difference == Some(1));
+        for (pixel, shown) in image.pixels.iter().zip(shown_image.as_chunks::<4>().0) {
+            let expected = tone_map.apply(*pixel).to_array().map(|linear| 255.0 * srgb(linear));
+            // Adapters may be off by 0.6 of a step when they convert to bytes (Direct3D 11.3 specification, 3.2.3.6).
+            let off = (0..3).map(|c| (expected[c] - f32::from(shown[c])).abs()).fold(0.0, f32::max);
+            assert!(off < 0.61 && shown[3] == 255, "{expected:?} {shown:?}");
         }
-        // Only values within rounding of half a byte differ.
-        assert!(off * 50 < size[0] * size[1], "{off}");
     }
 }
 

@@ -14,7 +14,7 @@ use crate::effective::{
 };
 use crate::gpu::render::gbuffer::GpuPoint;
 use crate::gpu::{Gpu, GpuError, GpuRenderer, render_gpu};
-use crate::math::directions::HemispherePairGrid;
+use crate::math::directions::{HemispherePairGrid, from_angles};
 use crate::pipeline::Pipeline;
 use crate::render::image::shading;
 use crate::render::image::shading::ImageBackground;
@@ -110,6 +110,15 @@ fn assert_same(what: &str, gpu: &Gpu, kind: &str, brdf: &EffectiveBrdf) {
     assert_same_image(what, &images);
 }
 
+/// A BRDF whose interreflection the CPU does not interpolate between points.
+struct AtEveryPoint<'a>(&'a EffectiveBrdf);
+
+impl Reflectance for AtEveryPoint<'_> {
+    fn eval_lights(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) {
+        self.0.eval_lights(lights, o, out);
+    }
+}
+
 fn assert_same_shading(what: &str, gpu: &Gpu, kind: &str, brdf: &EffectiveBrdf) {
     let TestScene { mesh, occluder, lights, camera } = TestScene::of(kind);
     let view = CameraView::new(&camera, &mesh, [64, 64]).unwrap();
@@ -117,7 +126,7 @@ fn assert_same_shading(what: &str, gpu: &Gpu, kind: &str, brdf: &EffectiveBrdf) 
     let visible = occluder.as_ref().map(|o| o.visible_lights(&mesh, &points, &lights, view.eye, None));
     let mut shading = GpuShading::new(gpu).unwrap();
     let material = shading.material(gpu, brdf, visible.is_some()).unwrap();
-    let cpu = shading::radiance(&points, &lights, visible.as_ref(), view.eye, brdf);
+    let cpu = shading::radiance(&points, &lights, visible.as_ref(), view.eye, &AtEveryPoint(brdf));
     let gpu_radiance = radiance(gpu, &shading, &material, &points, &lights, visible.as_ref(), view.eye);
     let (_, worst, _) = distances(&cpu, &gpu_radiance);
     eprint!("{what}: shading within {worst:.1e}; ");
@@ -217,6 +226,25 @@ fn a_table_with_bounced_light_gives_the_same_image() {
     table.eval_bounced(&[Vec3::Z], Vec3::Z, &mut bounced);
     assert!(bounced[0].min_element() > 0.0);
     assert_same("bounced light", &gpu, "sphere", &table);
+}
+
+#[test]
+fn bounced_light_beside_direct_sums_gives_the_same_image() {
+    let Some(gpu) = open_gpu() else { return };
+    for (geometry, kind, brdf) in
+        [(GROOVES, "cup", LOBES[4]), (PYRAMIDS, "sphere", LOBES[0]), (RODS, "sphere", LOBES[2])]
+    {
+        let mut loaded = open(geometry, brdf, "direct");
+        loaded.scene.effects.interreflection = scene::Switch::On;
+        let brdf = effective(&loaded);
+        let Representation::Interreflecting(direct, _) = &brdf.representation else { panic!("{geometry}: no light") };
+        assert!(matches!(**direct, Representation::Direct(_)));
+        let [i, o] = [(0.6, 1.0), (0.7, 2.8)].map(|(theta, phi)| from_angles(theta, phi));
+        let mut bounced = [Vec3::ZERO];
+        brdf.eval_bounced(&[i], o, &mut bounced);
+        assert!(bounced[0].y > 0.01 * brdf.eval(i, o).y, "{geometry}: {} of {}", bounced[0], brdf.eval(i, o));
+        assert_same(geometry, &gpu, kind, &brdf);
+    }
 }
 
 #[test]

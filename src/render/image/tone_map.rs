@@ -61,10 +61,14 @@ fn within(x: f32, high: f32) -> f32 {
     if x > 0.0 { x.min(high) } else { 0.0 }
 }
 
-/// Encodes linear light with the sRGB transfer function (IEC 61966-2-1) in 8 bits.
+/// Encodes linear light with the sRGB transfer function (IEC 61966-2-1).
+pub fn srgb(linear: f32) -> f32 {
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// Encodes linear light with [`srgb`] in 8 bits.
 pub fn srgb_byte(linear: f32) -> u8 {
-    let encoded = if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
-    (encoded * 255.0 + 0.5) as u8
+    (srgb(linear) * 255.0 + 0.5) as u8
 }
 
 #[cfg(test)]

@@ -1,0 +1,60 @@
+//! The shading pass of interreflection, which follows those of a direct sum.
+
+use bytemuck::{Pod, Zeroable};
+
+use super::{GpuShading, Pass, SecondGroup, Variant, shadow_swap};
+use crate::gpu::{Gpu, GpuError};
+use crate::interreflection::InterreflectionTable;
+
+/// `Grid` in `shade_bounced.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+struct Grid {
+    rings: u32,
+    columns: u32,
+    base_area: f32,
+    pad: u32,
+}
+
+/// Values of the table that a pair of directions reads: sixteen rows, sixteen columns.
+const READS_PER_PAIR: u64 = 256;
+
+impl GpuShading {
+    /// The pass divides by the projected area that the passes of the direct sum leave in the scales of points.
+    pub(super) fn bounced_pass(
+        &mut self,
+        gpu: &Gpu,
+        table: &InterreflectionTable,
+        base_area: f64,
+        shadowed: bool,
+    ) -> Result<Pass, GpuError> {
+        let starts: Vec<u32> = (0..=table.grid.ring_count()).map(|ring| table.grid.first_node(ring) as u32).collect();
+        let values = table.rgb_rows();
+        let grid = Grid {
+            rings: table.grid.rings as u32,
+            columns: (values.len() / table.grid.len()) as u32,
+            base_area: base_area as f32,
+            pad: 0,
+        };
+        let usage = wgpu::BufferUsages::STORAGE;
+        let bound = [
+            gpu.upload("grid", &[grid], wgpu::BufferUsages::UNIFORM)?,
+            gpu.upload("rings", &starts, usage)?,
+            gpu.upload("light between facets", &values, usage)?,
+            gpu.upload::<u32>("nothing", &[], usage)?,
+        ];
+        let variant = Variant {
+            shader: "shade_bounced",
+            entry_point: "shade",
+            swaps: vec![shadow_swap(shadowed)],
+            constants: Vec::new(),
+        };
+        let resources: Vec<_> = bound.iter().map(wgpu::Buffer::as_entire_binding).collect();
+        Ok(Pass {
+            pipeline: self.pipeline(gpu, variant, SecondGroup::Factors)?,
+            group: gpu.group("factors", &self.factors, &resources)?,
+            work: READS_PER_PAIR,
+            each_light: true,
+        })
+    }
+}
