@@ -71,7 +71,6 @@ const MEASUREMENTS: &[(&str, &str, Source)] = &[
     ("errors", "true and stated errors of the presets on hard tiles: many minutes", Source::Here(errors)),
     ("factored", "true and stated errors of low-rank factors that a scene asks for: minutes", Source::Here(factored)),
     ("few-facets", "errors of sums over 700 facets with few distinct normals", Source::Here(few_facets)),
-    ("gpu-counts", "operations of an edit on a GPU", in_lib("counts_of_an_edit")),
     ("gpu-table", "time of a shading table on the CPU and on the GPU", in_lib("the_table_of_a_height_field_is_timed")),
     ("half-floats", "errors of shading tables in half precision", in_lib("half_floats_would_change_a_table_by_this")),
     (
@@ -106,7 +105,6 @@ const MEASUREMENTS: &[(&str, &str, Source)] = &[
         in_lib("figure_7_by_the_slab_by_one_refraction"),
     ),
     ("slabs", "errors of the models of slabs against photons, and their times: minutes", Source::Here(slabs)),
-    ("slice-steps", "cells and triangles that a slice visits", in_lib("steps_of_slices")),
     ("table-steps", "errors of shading tables against facets, azimuths and nodes", Source::Here(steps)),
     ("table-trials", "times of the trial of a shading table and of the whole table", Source::Here(trials)),
 ];

@@ -1,6 +1,7 @@
 // Deferred shading with factors: the twin of LowRank::sums (src/effective/low_rank/), G = Σ_c U_c(i,o) P_c(h,d).
 
 //!import shading_points
+//!import scales
 //!import shadows_none
 //!import polar_grid
 //!import tint_row
@@ -128,6 +129,7 @@ fn shade(@builtin(global_invocation_id) id: vec3u) {
     let frame = frame_of(point);
     let o = view_of(point, frame);
     if o.z <= 0.0 {
+        set_scale(point, id.y, 0.0);
         return;
     }
     let to_viewer = grid_taps(o, grids.rings, grids.azimuths);
@@ -137,7 +139,9 @@ fn shade(@builtin(global_invocation_id) id: vec3u) {
         area += to_viewer.weights[k] * p_factors[grids.first_area + node / 4u][node % 4u];
     }
     area *= o.z;
-    if area <= params.min_area {
+    let scale = select(0.0, 1.0 / area, area > params.min_area);
+    set_scale(point, id.y, scale);
+    if scale == 0.0 {
         return;
     }
     var total = vec3f(0.0);
@@ -159,5 +163,5 @@ fn shade(@builtin(global_invocation_id) id: vec3u) {
         // Truncated factors may be slightly negative; a BRDF is not.
         total += lights[k].irradiance * max(value, vec3f(0.0)) * (horizon_taper(i.z) * horizon_taper(o.z));
     }
-    add_radiance(point, id.y, total / area);
+    add_radiance(point, id.y, total * scale);
 }

@@ -2,6 +2,7 @@
 // (src/effective/shading_table/), a_v f̄ = Σ_c w_c(i,o) T_c(i,o).
 
 //!import shading_points
+//!import scales
 //!import shadows_none
 //!import polar_grid
 //!import cubic
@@ -112,6 +113,7 @@ fn shade(@builtin(global_invocation_id) id: vec3u) {
     let frame = frame_of(point);
     let o = view_of(point, frame);
     if o.z <= 0.0 {
+        set_scale(point, id.y, 0.0);
         return;
     }
     let to_viewer = grid_taps(o, table.rings, table.azimuths);
@@ -120,7 +122,9 @@ fn shade(@builtin(global_invocation_id) id: vec3u) {
         area += to_viewer.weights[k] * areas[to_viewer.nodes[k]];
     }
     area *= o.z;
-    if area <= params.min_area {
+    let scale = select(0.0, 1.0 / area, area > params.min_area);
+    set_scale(point, id.y, scale);
+    if scale == 0.0 {
         return;
     }
     var total = vec3f(0.0);
@@ -139,5 +143,5 @@ fn shade(@builtin(global_invocation_id) id: vec3u) {
         }
         total += lights[k].irradiance * value;
     }
-    add_radiance(point, id.y, total / area);
+    add_radiance(point, id.y, total * scale);
 }

@@ -38,9 +38,6 @@ const MIN_LINES: u32 = 8192u;
 // The smallest slope that is resolved, as in src/visibility/mod.rs.
 const MIN_SLOPE: f32 = 0.005;
 
-// If set, the output is the number of crossed edges, for tests.
-override COUNTING: bool = false;
-
 const COLUMNS: u32 = 0u;
 const ROWS: u32 = 1u;
 
@@ -52,8 +49,6 @@ fn wrapped(k: f32, n: u32) -> u32 {
 fn height_at(column: f32, row: f32) -> f32 {
     return heights[wrapped(row, params.size.y) * params.size.x + wrapped(column, params.size.x)];
 }
-
-var<private> crossings: u32;
 
 // A walk over one family of edges: the start and the speed across the edges and along them, the largest number of
 // crossings, and the smallest slope that is resolved.
@@ -87,7 +82,6 @@ fn highest_slope(edges: u32, walk: Walk, z: f32, known: f32) -> f32 {
         if highest <= min_slope {
             return max(slope, min(min_slope, (params.top - z) / begin));
         }
-        crossings++;
         let line = first + sign_across * f32(k);
         let position = along.x + along.y * distance;
         let low = floor(position);
@@ -111,7 +105,6 @@ fn march(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= params.facet_count {
         return;
     }
-    crossings = 0u;
     let azimuth = params.first_azimuth + id.y;
     let direction = directions[azimuth];
     let start = facets[id.x].position;
@@ -138,10 +131,6 @@ fn march(@builtin(global_invocation_id) id: vec3u) {
         if !along_x {
             slope = highest_slope(ROWS, Walk(y, x, max_crossings, min_slope), start.z, slope);
         }
-    }
-    if COUNTING {
-        horizons[id.x * params.azimuths + azimuth] = f32(crossings);
-        return;
     }
     horizons[id.x * params.azimuths + azimuth] = select(FREE, min(slope, BLOCKED), slope > 0.0);
 }

@@ -42,8 +42,6 @@ struct Facet {
 
 // True if overhangs are stored apart from the horizon.
 override OVERHANGS: bool = false;
-// If set, the output is the number of steps plus 2²⁰ times the number of triangles cut, for tests.
-override COUNTING: bool = false;
 
 // HorizonMap::FREE and HorizonMap::BLOCKED.
 const FREE: f32 = -0.020002667;
@@ -60,7 +58,6 @@ const STORED_OVERHANGS: u32 = 4u;
 var<private> ground: f32;
 var<private> overhangs: array<vec2f, MAX_OVERHANGS>;
 var<private> count: u32;
-var<private> cuts: u32;
 
 // The slope up to which an interval that begins there joins this one: surfaces share edges up to rounding.
 fn joining_slope(slope: f32) -> f32 {
@@ -204,12 +201,12 @@ fn axis(at: f32, speed: f32, cell: f32) -> vec2f {
     return vec2f(FAR);
 }
 
-// Walks until nothing further can change the result, and returns the number of steps.
-fn walk(facet: Facet, along: vec2f, overhead: f32) -> u32 {
+// Walks until nothing further can change the result.
+fn walk(facet: Facet, along: vec2f, overhead: f32) {
     let origin = facet.origin;
     let clearance = params.top - origin.z;
     if clearance <= 0.0 {
-        return 0u;
+        return;
     }
     let at = origin.xy / params.cell_size;
     let position = floor(at);
@@ -288,7 +285,6 @@ fn walk(facet: Facet, along: vec2f, overhead: f32) -> u32 {
             if min(min(a, b), c) >= eye.x || max(max(a, b), c) < eye.x || entries[k].z_min >= ceiling {
                 continue;
             }
-            cuts++;
             let slopes = cut(k, vec3f(a, b, c), along, eye);
             if slopes.y <= ground || (count > 0u && overhangs[0].x <= slopes.x && slopes.y <= overhangs[0].y) {
                 continue;
@@ -298,7 +294,6 @@ fn walk(facet: Facet, along: vec2f, overhead: f32) -> u32 {
             }
         }
     }
-    return step_count;
 }
 
 @compute @workgroup_size(64)
@@ -312,7 +307,6 @@ fn scan(@builtin(global_invocation_id) id: vec3u) {
     // The slopes behind the facet count as blocked from the start.
     let ahead = dot(facet.normal.xy, along) + params.facing_margin;
     count = 0u;
-    cuts = 0u;
     ground = 0.0;
     var overhead = FAR;
     if ahead >= 0.0 {
@@ -326,15 +320,10 @@ fn scan(@builtin(global_invocation_id) id: vec3u) {
     } else {
         ground = MAX_SLOPE;
     }
-    var step_count = 0u;
     if ground < MAX_SLOPE {
-        step_count = walk(facet, along, overhead);
+        walk(facet, along, overhead);
     }
     let slice = id.x * params.azimuths + azimuth;
-    if COUNTING {
-        output[slice] = min(step_count, 0xfffffu) | (min(cuts, 0xfffu) << 20u);
-        return;
-    }
     if !OVERHANGS {
         var highest = ground;
         if count > 0u {

@@ -130,8 +130,9 @@ impl CameraEdit {
         Ok(Self { render_scene, path, shading_brdf })
     }
 
-    /// Renders the image and returns the milliseconds of its stages.
+    /// Turns the camera, renders the image and returns the milliseconds of its stages.
     fn run(&mut self, size: [usize; 2]) -> Result<StageTimes> {
+        self.render_scene.camera.azimuth_deg += 2.0;
         let times = self.path.show(&self.render_scene, &self.shading_brdf.brdf, size)?;
         Ok(vec![("g_buffer", times.gbuffer_ms), ("shadows", times.shadows_ms), ("shading", times.shading_ms)])
     }

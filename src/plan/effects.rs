@@ -149,8 +149,8 @@ pub fn switch_mut<'a>(effects: &'a mut Effects, name: &str) -> Option<&'a mut Sw
     row.switch.map(|field| field(effects))
 }
 
-/// Milliseconds per triangle and direction of shadow maps on a GPU.
-const GPU_MAP_TRIANGLE_MS: f64 = 2e-6;
+/// Milliseconds of a shadow map on a GPU.
+const GPU_MAP_MS: f64 = 0.06;
 
 fn visibility(context: &Context<'_>, switch: Switch) -> Decision {
     let Context { features, settings, costs, algorithm, .. } = *context;
@@ -195,7 +195,7 @@ fn visibility(context: &Context<'_>, switch: Switch) -> Decision {
         ),
         VisibilityAlgorithm::GpuMaps => (
             format!("{cause}: {} toroidal shadow maps on the GPU", settings.map_grid.len()),
-            settings.map_grid.len() as f64 * features.triangles as f64 * GPU_MAP_TRIANGLE_MS,
+            settings.map_grid.len() as f64 * GPU_MAP_MS,
         ),
     };
     let bound = if features.flat { ROUNDING } else { settings.tolerance };

@@ -1,8 +1,6 @@
 //! Whole images on the GPU.
 
 mod band;
-#[cfg(test)]
-mod counts_tests;
 pub(crate) mod gbuffer;
 pub mod image;
 mod light_rays;

@@ -1,4 +1,4 @@
-//! The shading pass of interreflection, which follows those of a direct sum.
+//! The shading pass of interreflection, which follows those of direct reflection.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -20,7 +20,7 @@ struct Grid {
 const READS_PER_PAIR: u64 = 256;
 
 impl GpuShading {
-    /// The pass divides by the projected area that the passes of the direct sum leave in the scales of points.
+    /// The pass divides by the projected area that the passes before it leave in the scales of points.
     pub(super) fn bounced_pass(
         &mut self,
         gpu: &Gpu,

@@ -142,16 +142,11 @@ impl GpuShading {
                 return Ok(GpuMaterial { preparation, ..GpuMaterial::of(passes, brdf.base_area) });
             }
             Representation::LowRank(form) => vec![self.low_rank_pass(gpu, form, shadowed)?],
-            Representation::Interreflecting(direct, bounced) if matches!(**direct, Representation::Direct(_)) => {
+            Representation::Interreflecting(direct, bounced) => {
                 let direct = EffectiveBrdf { representation: (**direct).clone(), base_area: brdf.base_area };
                 let mut material = self.material(gpu, &direct, shadowed)?;
                 material.passes.push(self.bounced_pass(gpu, bounced, brdf.base_area, shadowed)?);
                 return Ok(material);
-            }
-            Representation::Interreflecting(..) => {
-                return Err(GpuError::Unsupported(
-                    "interreflection beside factors is added on the CPU only".to_owned(),
-                ));
             }
             Representation::Table(table) => vec![self.table_pass(gpu, table, shadowed)?],
             Representation::Wu2011(_) => {

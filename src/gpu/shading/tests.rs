@@ -229,21 +229,35 @@ fn a_table_with_bounced_light_gives_the_same_image() {
 }
 
 #[test]
-fn bounced_light_beside_direct_sums_gives_the_same_image() {
+fn bounced_light_beside_each_representation_gives_the_same_image() {
     let Some(gpu) = open_gpu() else { return };
-    for (geometry, kind, brdf) in
-        [(GROOVES, "cup", LOBES[4]), (PYRAMIDS, "sphere", LOBES[0]), (RODS, "sphere", LOBES[2])]
-    {
-        let mut loaded = open(geometry, brdf, "direct");
+    for (geometry, kind, lobe, method) in [
+        (GROOVES, "cup", LOBES[4], "direct"),
+        (PYRAMIDS, "sphere", LOBES[0], "direct"),
+        (RODS, "sphere", LOBES[2], "direct"),
+        (PYRAMIDS, "cup", LOBES[0], "low_rank"),
+        (RODS, "sphere", LOBES[0], "table"),
+    ] {
+        let mut loaded = open(geometry, lobe, if method == "table" { "direct" } else { method });
         loaded.scene.effects.interreflection = scene::Switch::On;
-        let brdf = effective(&loaded);
-        let Representation::Interreflecting(direct, _) = &brdf.representation else { panic!("{geometry}: no light") };
-        assert!(matches!(**direct, Representation::Direct(_)));
+        let mut brdf = effective(&loaded);
+        if let (Representation::Direct(direct), "table") = (brdf.direct_representation(), method) {
+            let nodes = Nodes::all(HemispherePairGrid { rings: 6, azimuths: 12, phi_d: 8, theta_d: 8 });
+            let table = ShadingTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap();
+            brdf = brdf.with_direct_representation(Representation::Table(table));
+        }
+        let is_tested = match brdf.direct_representation() {
+            Representation::Direct(_) => method == "direct",
+            Representation::LowRank(_) => method == "low_rank",
+            Representation::Table(_) => method == "table",
+            _ => false,
+        };
+        assert!(is_tested && matches!(brdf.representation, Representation::Interreflecting(..)), "{geometry} {method}");
         let [i, o] = [(0.6, 1.0), (0.7, 2.8)].map(|(theta, phi)| from_angles(theta, phi));
         let mut bounced = [Vec3::ZERO];
         brdf.eval_bounced(&[i], o, &mut bounced);
         assert!(bounced[0].y > 0.01 * brdf.eval(i, o).y, "{geometry}: {} of {}", bounced[0], brdf.eval(i, o));
-        assert_same(geometry, &gpu, kind, &brdf);
+        assert_same(&format!("{geometry} {method}"), &gpu, kind, &brdf);
     }
 }
 

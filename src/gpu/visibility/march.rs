@@ -163,26 +163,6 @@ impl GpuHorizonMap {
     }
 }
 
-/// Returns the mean number of edges that a walk of `height_march.wgsl` crosses.
-#[cfg(test)]
-pub(crate) fn crossings(
-    gpu: &Gpu,
-    (heights, tile_size, facets): (&HeightGrid, glam::Vec2, &Facets),
-    azimuths: usize,
-) -> f64 {
-    let mut march = GpuHeightMarch::new(gpu).unwrap();
-    let module = gpu.module("height_march").unwrap();
-    march.march = gpu.compute_pipeline_with(&module, "march", &[&march.layout], &[("COUNTING", 1.0)]).unwrap();
-    let map = march.horizon_map(gpu, heights, tile_size, facets, azimuths).unwrap();
-    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    for run in 0..map.runs() {
-        map.dispatch(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()), run);
-    }
-    gpu.queue.submit([encoder.finish()]);
-    let counts: Vec<f32> = gpu.read(&map.slopes).unwrap();
-    counts.iter().map(|&count| f64::from(count)).sum::<f64>() / counts.len() as f64
-}
-
 #[cfg(test)]
 #[path = "march_tests.rs"]
 mod tests;

@@ -7,9 +7,5 @@ mod shadow_map_tests;
 mod slices;
 
 pub use maps::{GpuMaps, GpuShadowMaps, visibility_maps_gpu};
-#[cfg(test)]
-pub(crate) use march::crossings;
 pub use march::{GpuHeightMarch, GpuHorizonMap};
 pub use slices::GpuSlicer;
-#[cfg(test)]
-pub(crate) use slices::tests::steps;

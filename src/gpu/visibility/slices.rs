@@ -108,16 +108,6 @@ impl GpuSlicer {
             }
         };
         self.compiled[usize::from(overhangs)] = Some(pipeline.clone());
-        self.prepare_with(gpu, pipeline, words, (grid, facets, azimuths))
-    }
-
-    fn prepare_with(
-        &self,
-        gpu: &Gpu,
-        pipeline: wgpu::ComputePipeline,
-        words: usize,
-        (grid, facets, azimuths): (&PeriodicGrid, &Facets, usize),
-    ) -> Result<GpuHorizonMap, GpuError> {
         use wgpu::BufferUsages as Usage;
         let params = Params {
             tile_size: grid.tile_size,
@@ -186,4 +176,4 @@ impl GpuSlicer {
 
 #[cfg(test)]
 #[path = "slices_tests.rs"]
-pub(crate) mod tests;
+mod tests;

@@ -3,9 +3,7 @@
 use super::*;
 use crate::geometry::TileMesh;
 use crate::pipeline::Pipeline;
-use crate::plan::{Preset, Settings};
 use crate::scene;
-use crate::visibility::shadow_view::{ShadowView, affordable_resolution, max_coordinate};
 use crate::visibility::{HorizonMap, OcclusionIntervals};
 
 fn open_gpu() -> Option<Gpu> {
@@ -89,53 +87,5 @@ fn gpu_and_cpu_compute_the_same_intervals_of_meshes_with_overhangs() {
         assert!(overhang_count * 25 > slices, "{name}: no overhangs");
         // Gaps of rounding size, and slices that graze an edge.
         assert!(within < 1e-4 && differ * 100 < slices, "{name}: {within}, {differ} of {slices}");
-    }
-}
-
-/// Returns the mean number of steps per slice, and of triangles that it cuts.
-pub(crate) fn steps(gpu: &Gpu, grid: &PeriodicGrid, facets: &Facets, azimuths: usize, overhangs: bool) -> [f64; 2] {
-    let slicer = GpuSlicer::new(gpu).unwrap();
-    let constants = [("COUNTING", 1.0), ("OVERHANGS", f64::from(u8::from(overhangs)))];
-    let counting = gpu.compute_pipeline_with(&slicer.module, "scan", &[&slicer.layout], &constants).unwrap();
-    let map = slicer.prepare_with(gpu, counting, 1, (grid, facets, azimuths)).unwrap();
-    let found = read(gpu, &map);
-    let mean = |of: fn(u32) -> u32| found.iter().map(|&both| f64::from(of(both))).sum::<f64>() / found.len() as f64;
-    [mean(|both| both & 0xf_ffff), mean(|both| both >> 20)]
-}
-
-/// Returns the number of texels of all maps of `fine` that the triangles of a tile cover.
-fn covered(mesh: &TileMesh) -> f64 {
-    let settings = Settings::of_preset(Preset::Fine);
-    let (extent, resolution) = (max_coordinate(mesh), affordable_resolution(mesh, settings.map_resolution));
-    let of_view = |direction: &Vec3| {
-        let view = ShadowView::new(mesh.size, extent, *direction, resolution).unwrap();
-        let twice_area = |triangle: usize| {
-            let [a, b, c] = mesh.corners(triangle).map(|corner| view.texel(corner));
-            f64::from((b - a).perp_dot(c - a).abs())
-        };
-        0.5 * (0..mesh.triangles.len()).map(twice_area).sum::<f64>()
-    };
-    settings.map_grid.directions().par_iter().map(of_view).sum()
-}
-
-/// Prints the steps and cuts per slice, and the share of slices with more than four overhangs.
-#[test]
-#[ignore = "a measurement: cargo bench --bench measure -- slice-steps"]
-fn steps_of_slices() {
-    let Some(gpu) = open_gpu() else { return };
-    println!("scene                 cells  steps/slice  cuts  more than 4 overhangs  texels of maps at fine");
-    for name in
-        ["table4_pillow", "table4_skirt", "fig6a_velvet_spread", "fig6c_velvet_up", "table4_teapot", "table4_cup"]
-    {
-        let (mesh, facets) = tile(name, 1024);
-        let of = OcclusionIntervals::scan(&PeriodicGrid::for_slices(&mesh), &facets, 24, 0.02);
-        let (starts, _) = of.overhangs_by_facet();
-        let many = starts.windows(2).filter(|ends| ends[1] - ends[0] > 4).count();
-        let many = 100.0 * many as f64 / (starts.len() - 1) as f64;
-        for grid in [PeriodicGrid::new(&mesh), PeriodicGrid::for_slices(&mesh)] {
-            let [steps, cuts] = steps(&gpu, &grid, &facets, 24, true);
-            let cells = grid.cells.x * grid.cells.y;
-            println!("{name:<20} {cells:>6} {steps:>12.1} {cuts:>5.1} {many:>19.2} % {:>23.1e}", covered(&mesh));
-        }
     }
 }
