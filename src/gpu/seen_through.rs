@@ -10,7 +10,7 @@ use super::device::pipelines::{READ, UNIFORM, WRITE};
 use super::{Gpu, GpuError};
 use crate::base::Result;
 use crate::effective::{ViewLobe, ViewLobes};
-use crate::render::image::render::{RenderTimes, check_size, visible_points};
+use crate::render::image::render::{RenderTimes, check_size};
 use crate::render::image::shading::gather_over;
 use crate::render::image::shading_points::ShadingPoints;
 use crate::render::seen_through::{Backdrop, Kernel, SlabScene};
@@ -100,7 +100,7 @@ impl GpuSeenThrough {
         check_size(size, samples_per_side)?;
         let view = CameraView::new(&render_scene.camera, render_scene.mesh(), size)?;
         let start = Instant::now();
-        let points = visible_points(render_scene.mesh(), &view, samples_per_side);
+        let points = ShadingPoints::new(render_scene.mesh(), &view, samples_per_side);
         let after_gbuffer = Instant::now();
         let radiance = self.radiance(gpu, &view, &points)?;
         let (of_points, behind) = radiance.split_at(points.len());

@@ -150,7 +150,7 @@ fn on_gpu_and_cpu_the_same_samples_share_a_point() {
     for kind in ["sphere", "cup", "skirt"] {
         let (mesh, size, samples) = (object(kind), [150, 130], 2);
         let view = view(&mesh, 0.0, size);
-        let points = ShadingPoints::new(&GBuffer::new(&mesh, &view, samples), &view, samples);
+        let points = ShadingPoints::new(&mesh, &view, samples);
         let [gpu_points, _] = points_and_lifted(&gpu, &mesh, &camera(0.0), size, samples);
         let pixels = size[0] * size[1];
         let (mut weights, mut firsts) = (vec![Vec::new(); pixels], vec![Vec3::ZERO; pixels]);
@@ -287,7 +287,7 @@ fn gpu_and_cpu_compute_the_same_visible_lights() {
     for kind in ["cup", "skirt", "teapot"] {
         let mesh = object(kind);
         let view = view(&mesh, 0.0, [150, 130]);
-        let points = ShadingPoints::new(&GBuffer::new(&mesh, &view, 1), &view, 1);
+        let points = ShadingPoints::new(&mesh, &view, 1);
         let occluder = Occluder::if_needed(&mesh).unwrap();
         let cpu = occluder.visible_lights(&mesh, &points, &lights, view.eye, None);
         let gpu_visible = traced(&gpu, &mesh, &occluder, &points, &lights, view.eye);

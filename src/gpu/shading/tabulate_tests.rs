@@ -15,8 +15,8 @@ use crate::gpu::shading::visibility::GpuVisibility;
 use crate::gpu::shading::{GpuMaterial, GpuShading};
 use crate::gpu::{Gpu, GpuError};
 use crate::math::directions::{HemispherePairGrid, from_angles};
+use crate::render::CameraView;
 use crate::render::image::shading_points::ShadingPoints;
-use crate::render::{CameraView, GBuffer};
 use crate::visibility::Visibility;
 
 const GRID: HemispherePairGrid = HemispherePairGrid { rings: 5, azimuths: 10, phi_d: 4, theta_d: 6 };
@@ -277,7 +277,7 @@ fn a_table_computed_on_the_gpu_shades_like_the_same_table_uploaded() {
     let Some(gpu) = open_gpu() else { return };
     let TestScene { mesh, occluder, lights, camera } = TestScene::of("cup");
     let view = CameraView::new(&camera, &mesh, [64, 64]).unwrap();
-    let points = ShadingPoints::new(&GBuffer::new(&mesh, &view, 1), &view, 1);
+    let points = ShadingPoints::new(&mesh, &view, 1);
     let visible = occluder.as_ref().map(|o| o.visible_lights(&mesh, &points, &lights, view.eye, None)).unwrap();
     let mut shading = GpuShading::new(&gpu).unwrap();
     let two = format!("[{}, {}]", LOBES[0], LOBES[2]);
@@ -352,7 +352,7 @@ fn a_black_tile_has_a_table_without_columns_and_shades_black() {
     let Some(gpu) = open_gpu() else { return };
     let TestScene { mesh, lights, camera, .. } = TestScene::of("sphere");
     let view = CameraView::new(&camera, &mesh, [16, 16]).unwrap();
-    let points = ShadingPoints::new(&GBuffer::new(&mesh, &view, 1), &view, 1);
+    let points = ShadingPoints::new(&mesh, &view, 1);
     let brdf = scattered(["{ kind = \"lambertian\", albedo = 0.0 }"; 2], false);
     let mut shading = GpuShading::new(&gpu).unwrap();
     let material = tabulated(&gpu, &mut shading, &brdf, (GRID, [false; 2], Interpolation::Cubic), false).unwrap();

@@ -22,7 +22,7 @@ use crate::render::image::shading_points::ShadingPoints;
 use crate::render::lighting::lights;
 use crate::render::render;
 use crate::render::shadow::{LightVisibility, Occluder};
-use crate::render::{CameraView, DirectionalLight, GBuffer, Image, ObjectMesh, RenderInput, object};
+use crate::render::{CameraView, DirectionalLight, Image, ObjectMesh, RenderInput, object};
 use crate::scene;
 use crate::scene::LoadedScene;
 use crate::visibility::Visibility;
@@ -122,7 +122,7 @@ impl Reflectance for AtEveryPoint<'_> {
 fn assert_same_shading(what: &str, gpu: &Gpu, kind: &str, brdf: &EffectiveBrdf) {
     let TestScene { mesh, occluder, lights, camera } = TestScene::of(kind);
     let view = CameraView::new(&camera, &mesh, [64, 64]).unwrap();
-    let points = ShadingPoints::new(&GBuffer::new(&mesh, &view, 1), &view, 1);
+    let points = ShadingPoints::new(&mesh, &view, 1);
     let visible = occluder.as_ref().map(|o| o.visible_lights(&mesh, &points, &lights, view.eye, None));
     let mut shading = GpuShading::new(gpu).unwrap();
     let material = shading.material(gpu, brdf, visible.is_some()).unwrap();

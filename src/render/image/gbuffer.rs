@@ -11,8 +11,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::raster;
-use super::raster::{NO_TRIANGLE, RasterSample};
+use super::raster::{NO_TRIANGLE, Projection, RasterSample};
 use crate::render::{CameraView, ObjectMesh};
 
 /// Smallest cosine between a shading normal and the view direction (88.85°).
@@ -34,30 +33,63 @@ pub struct GBuffer {
     pub tangents: Vec<Vec3>,
 }
 
+/// Rows of samples per band, rounded up to whole pixels.
+const BAND: usize = 16;
+
 impl GBuffer {
     /// Rasterises the mesh with `samples_per_side²` samples per pixel.
     pub fn new(mesh: &ObjectMesh, view: &CameraView, samples_per_side: usize) -> Self {
-        let [width, height] = view.size.map(|n| n * samples_per_side);
-        let samples = raster::rasterize(mesh, view, width, height);
-        let count = samples.len();
+        let bands = Self::map_bands(mesh, view, samples_per_side, |_, band| band);
+        bands.into_iter().fold(Self::default(), Self::above)
+    }
+
+    /// Calls `of` with the first row of pixels and the G-buffer of each band of rows, in parallel, and returns the results
+    /// in order. A band fits into a processor's cache, which an image does not.
+    pub fn map_bands<T: Send>(
+        mesh: &ObjectMesh,
+        view: &CameraView,
+        samples_per_side: usize,
+        of: impl Fn(usize, Self) -> T + Sync,
+    ) -> Vec<T> {
+        let pixel_rows = BAND.div_ceil(samples_per_side);
+        let size = view.size.map(|n| n * samples_per_side);
+        let projection = Projection::new(mesh, view, size, pixel_rows * samples_per_side);
+        let of_band =
+            |band: usize| of(band * pixel_rows, Self::of_samples(mesh, view, size[0], &projection.samples(band)));
+        (0..projection.band_count()).into_par_iter().map(of_band).collect()
+    }
+
+    fn of_samples(mesh: &ObjectMesh, view: &CameraView, width: usize, samples: &[RasterSample]) -> Self {
+        let empty = || Vec::with_capacity(samples.len());
         let mut buffer = Self {
             width,
-            height,
-            triangles: vec![NO_TRIANGLE; count],
-            positions: vec![Vec3::ZERO; count],
-            normals: vec![Vec3::ZERO; count],
-            tangents: vec![Vec3::ZERO; count],
+            height: samples.len() / width.max(1),
+            triangles: samples.iter().map(|sample| sample.triangle).collect(),
+            positions: empty(),
+            normals: empty(),
+            tangents: empty(),
         };
-        let arrays = (&mut buffer.triangles, &mut buffer.positions, &mut buffer.normals, &mut buffer.tangents);
-        (samples.par_iter(), arrays.0, arrays.1, arrays.2, arrays.3).into_par_iter().with_min_len(1024).for_each(
-            |(sample, triangle, position, normal, tangent)| {
-                if sample.triangle != NO_TRIANGLE {
-                    *triangle = sample.triangle;
-                    (*position, *normal, *tangent) = resolve(mesh, view, sample);
-                }
-            },
-        );
+        for sample in samples {
+            let (position, normal, tangent) = match sample.triangle {
+                NO_TRIANGLE => (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO),
+                _ => resolve(mesh, view, sample),
+            };
+            buffer.positions.push(position);
+            buffer.normals.push(normal);
+            buffer.tangents.push(tangent);
+        }
         buffer
+    }
+
+    /// This buffer with the rows of another below it.
+    fn above(mut self, below: Self) -> Self {
+        self.width = below.width;
+        self.height += below.height;
+        self.triangles.extend(below.triangles);
+        self.positions.extend(below.positions);
+        self.normals.extend(below.normals);
+        self.tangents.extend(below.tangents);
+        self
     }
 }
 

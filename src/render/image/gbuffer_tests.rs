@@ -29,6 +29,28 @@ fn every_covered_sample_has_a_frame_that_faces_the_viewer() {
 }
 
 #[test]
+fn bands_hold_whole_pixels_and_follow_each_other() {
+    let (mesh, view) = view_of("teapot");
+    let view = CameraView { size: [96, 50], ..view };
+    for samples_per_side in [1, 3, 20] {
+        let [width, height] = view.size.map(|n| n * samples_per_side);
+        let rows =
+            GBuffer::map_bands(&mesh, &view, samples_per_side, |row, band| (row * samples_per_side, band.height));
+        let mut next = 0;
+        for (row, height) in &rows {
+            assert!(*row == next && height % samples_per_side == 0, "{rows:?}");
+            next += height;
+        }
+        assert_eq!(next, height);
+        let at_once = Projection::new(&mesh, &view, [width, height], height);
+        assert_eq!(at_once.band_count(), 1);
+        let whole = GBuffer::of_samples(&mesh, &view, width, &at_once.samples(0));
+        assert!(GBuffer::new(&mesh, &view, samples_per_side) == whole, "{samples_per_side} samples per side");
+        assert!(whole.triangles.iter().any(|triangle| *triangle != NO_TRIANGLE));
+    }
+}
+
+#[test]
 fn a_sphere_has_its_exact_normals_except_at_the_rim() {
     let (mesh, view) = view_of("sphere");
     let buffer = GBuffer::new(&mesh, &view, 1);

@@ -19,8 +19,6 @@ pub const NO_TRIANGLE: u32 = u32::MAX;
 const SUBSTEPS: f64 = 256.0;
 /// Bounds snapped coordinates, so that products of differences fit in 63 bits.
 const MAX_COORDINATE: f64 = (1i64 << 29) as f64;
-/// Rows per task.
-const BAND: usize = 16;
 /// Triangles per projection task.
 const CHUNK: usize = 2048;
 
@@ -49,22 +47,41 @@ struct Projected {
     rows: [usize; 2],
 }
 
-/// Returns `width x height` samples, row by row: the image size times the samples per pixel side.
-pub fn rasterize(mesh: &ObjectMesh, view: &CameraView, width: usize, height: usize) -> Vec<RasterSample> {
-    let projected = project(mesh, view, width, height);
-    let mut bands = vec![Vec::new(); height.div_ceil(BAND)];
-    for (k, piece) in projected.iter().enumerate() {
-        for band in &mut bands[piece.rows[0] / BAND..piece.rows[1].div_ceil(BAND)] {
-            band.push(k as u32);
+/// A mesh projected into an image, with its triangles sorted into bands of rows.
+pub struct Projection {
+    /// Samples per row, and rows: the image size times the samples per pixel side.
+    size: [usize; 2],
+    rows_per_band: usize,
+    pieces: Vec<Projected>,
+    /// The pieces that each band may show.
+    bands: Vec<Vec<u32>>,
+}
+
+impl Projection {
+    pub fn new(mesh: &ObjectMesh, view: &CameraView, size: [usize; 2], rows_per_band: usize) -> Self {
+        let pieces = project(mesh, view, size[0], size[1]);
+        let mut bands = vec![Vec::new(); size[1].div_ceil(rows_per_band)];
+        for (k, piece) in pieces.iter().enumerate() {
+            for band in &mut bands[piece.rows[0] / rows_per_band..piece.rows[1].div_ceil(rows_per_band)] {
+                band.push(k as u32);
+            }
         }
+        Self { size, rows_per_band, pieces, bands }
     }
-    let mut samples = vec![EMPTY; width * height];
-    samples.par_chunks_mut(width.max(1) * BAND).zip(&bands).enumerate().for_each(|(band, (samples, pieces))| {
-        for &piece in pieces {
-            fill(&projected[piece as usize], samples, width, band * BAND);
+
+    pub fn band_count(&self) -> usize {
+        self.bands.len()
+    }
+
+    /// The samples of a band, row by row. The last band may have fewer rows.
+    pub fn samples(&self, band: usize) -> Vec<RasterSample> {
+        let ([width, height], first_row) = (self.size, band * self.rows_per_band);
+        let mut samples = vec![EMPTY; width * self.rows_per_band.min(height - first_row)];
+        for &piece in &self.bands[band] {
+            fill(&self.pieces[piece as usize], &mut samples, width, first_row);
         }
-    });
-    samples
+        samples
+    }
 }
 
 fn project(mesh: &ObjectMesh, view: &CameraView, width: usize, height: usize) -> Vec<Projected> {

@@ -27,6 +27,11 @@ fn facing(mesh: &ObjectMesh, azimuth_deg: f32, distance: f32, size: [usize; 2]) 
     CameraView::new(&camera, mesh, size).unwrap()
 }
 
+fn rasterize(mesh: &ObjectMesh, view: &CameraView, width: usize, height: usize) -> Vec<RasterSample> {
+    let projection = Projection::new(mesh, view, [width, height], 7);
+    (0..projection.band_count()).flat_map(|band| projection.samples(band)).collect()
+}
+
 #[test]
 fn each_sample_inside_a_triangulated_square_is_covered_exactly_once() {
     let mesh = square(13, false);

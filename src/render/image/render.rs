@@ -9,7 +9,7 @@ use crate::base::{InputError, Result};
 use crate::effective::Reflectance;
 use crate::render::shadow::shadow_cache::ShadowCache;
 use crate::render::shadow::{LightVisibility, Occluder};
-use crate::render::{CameraView, DirectionalLight, GBuffer, Image, ObjectMesh};
+use crate::render::{CameraView, DirectionalLight, Image, ObjectMesh};
 use crate::scene;
 
 /// Bounds the samples (pixels times samples per pixel) of one image; the G-buffer takes up to 56 bytes per sample.
@@ -87,7 +87,7 @@ impl VisiblePoints {
         check_size(input.size, input.samples_per_side)?;
         let view = CameraView::new(input.camera, input.mesh, input.size)?;
         let start = Instant::now();
-        let points = visible_points(input.mesh, &view, input.samples_per_side);
+        let points = ShadingPoints::new(input.mesh, &view, input.samples_per_side);
         let after_gbuffer = Instant::now();
         let visibility = input
             .occluder
@@ -110,12 +110,6 @@ impl VisiblePoints {
         let times = RenderTimes { shading_ms: start.elapsed().as_secs_f64() * 1e3, ..RenderTimes::default() };
         Ok(Rendered { image, times, points: self.points.len() })
     }
-}
-
-/// The points of an object that the camera sees.
-pub(crate) fn visible_points(mesh: &ObjectMesh, view: &CameraView, samples_per_side: usize) -> ShadingPoints {
-    let buffer = GBuffer::new(mesh, view, samples_per_side);
-    ShadingPoints::new(&buffer, view, samples_per_side)
 }
 
 pub(crate) fn check_size([width, height]: [usize; 2], samples_per_side: usize) -> Result<()> {

@@ -1,11 +1,10 @@
 //! The points at which the material is evaluated: one per pixel in smooth regions, one per sample at edges.
 
 use glam::Vec3;
-use rayon::prelude::*;
 
 use super::gbuffer::perpendicular;
 use super::raster::NO_TRIANGLE;
-use crate::render::{CameraView, GBuffer};
+use crate::render::{CameraView, GBuffer, ObjectMesh};
 
 /// Bounds the angle between normals of samples that share one evaluation: the cosine of 2°.
 const MIN_NORMAL_COSINE: f32 = 0.999_39;
@@ -27,29 +26,31 @@ pub struct ShadingPoints {
 }
 
 impl ShadingPoints {
-    /// Collects the shading points of a G-buffer with `samples_per_side²` samples per pixel of `view`.
-    pub fn new(buffer: &GBuffer, view: &CameraView, samples_per_side: usize) -> Self {
-        let [width, height] = view.size;
-        let rows: Vec<Self> = (0..height)
-            .into_par_iter()
-            .map(|row| {
-                let mut points = Self::default();
-                let mut samples = Vec::with_capacity(samples_per_side * samples_per_side);
-                for column in 0..width {
-                    samples.clear();
-                    for k in 0..samples_per_side * samples_per_side {
-                        let (x, y) = (
-                            column * samples_per_side + k % samples_per_side,
-                            row * samples_per_side + k / samples_per_side,
-                        );
-                        samples.push(y * buffer.width + x);
-                    }
-                    points.add_pixel((row * width + column) as u32, buffer, view, &samples);
+    /// The points that a mesh shows with `samples_per_side²` samples per pixel of `view`.
+    pub fn new(mesh: &ObjectMesh, view: &CameraView, samples_per_side: usize) -> Self {
+        let of_band = |first_row, buffer| Self::of_band(first_row, &buffer, view, samples_per_side);
+        let bands = GBuffer::map_bands(mesh, view, samples_per_side, of_band);
+        bands.into_iter().fold(Self::default(), Self::followed_by)
+    }
+
+    fn of_band(first_row: usize, buffer: &GBuffer, view: &CameraView, samples_per_side: usize) -> Self {
+        let width = view.size[0];
+        let mut points = Self::default();
+        let mut samples = Vec::with_capacity(samples_per_side * samples_per_side);
+        for row in 0..buffer.height / samples_per_side {
+            for column in 0..width {
+                samples.clear();
+                for k in 0..samples_per_side * samples_per_side {
+                    let (x, y) = (
+                        column * samples_per_side + k % samples_per_side,
+                        row * samples_per_side + k / samples_per_side,
+                    );
+                    samples.push(y * buffer.width + x);
                 }
-                points
-            })
-            .collect();
-        rows.into_iter().fold(Self::default(), Self::followed_by)
+                points.add_pixel(((first_row + row) * width + column) as u32, buffer, view, &samples);
+            }
+        }
+        points
     }
 
     pub fn len(&self) -> usize {

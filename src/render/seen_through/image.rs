@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::{Backdrop, BackdropFootprint, BackdropKernel};
 use crate::base::{Cancel, Result};
 use crate::effective::{PathKind, Reflectance, Transmittance, VaryingSurface, ViewLobe, ViewPaths, Viewer};
-use crate::render::image::render::{RenderTimes, check_size, visible_points};
+use crate::render::image::render::{RenderTimes, check_size};
 use crate::render::image::shading::gather_over;
 use crate::render::image::shading_points::ShadingPoints;
 use crate::render::{CameraView, DirectionalLight, ObjectMesh, Rendered};
@@ -60,7 +60,7 @@ pub fn render<S: VaryingSurface>(input: &SeenThrough<'_, S>) -> Result<Rendered>
     check_size(input.size, input.samples_per_side)?;
     let view = CameraView::new(input.camera, input.mesh, input.size)?;
     let start = Instant::now();
-    let points = visible_points(input.mesh, &view, input.samples_per_side);
+    let points = ShadingPoints::new(input.mesh, &view, input.samples_per_side);
     let after_gbuffer = Instant::now();
     let mut radiance = vec![Vec3::ZERO; points.len()];
     radiance.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, radiance)| {

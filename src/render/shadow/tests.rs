@@ -96,7 +96,7 @@ fn the_cache_agrees_with_cast_rays() {
         let occluder = Occluder::if_needed(&mesh).unwrap();
         let camera = scene::Camera::default();
         let view = crate::render::CameraView::new(&camera, &mesh, [96, 96]).unwrap();
-        let points = ShadingPoints::new(&crate::render::GBuffer::new(&mesh, &view, 1), &view, 1);
+        let points = ShadingPoints::new(&mesh, &view, 1);
         let environment = crate::render::lighting::environment::load("studio", std::path::Path::new(".")).unwrap();
         let lights = crate::render::lighting::environment::split(&environment.map, 40);
         let cache = occluder.cache(&mesh, &lights);

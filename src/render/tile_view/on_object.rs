@@ -11,7 +11,7 @@ use crate::base::{Cancel, Result};
 use crate::geometry::Hit;
 use crate::math::directions::half_vector;
 use crate::render::image::shading_points::ShadingPoints;
-use crate::render::{CameraView, GBuffer, Image, ObjectMesh, RenderInput};
+use crate::render::{CameraView, Image, ObjectMesh, RenderInput};
 
 /// A tile's shorter side, in radii of the object: so small that no tile is visible if the whole object fits the image.
 pub const TILE_RADII: f32 = 0.012;
@@ -58,8 +58,7 @@ impl TileScene {
             return Ok(());
         }
         let radius = input.mesh.bounds.radius;
-        let buffer = GBuffer::new(input.mesh, &view, 1);
-        let points = ShadingPoints::new(&buffer, &view, 1);
+        let points = ShadingPoints::new(input.mesh, &view, 1);
         let Some(anchor) = anchor(input, &view, &points) else { return Ok(()) };
         let visibility = input
             .occluder

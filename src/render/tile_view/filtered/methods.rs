@@ -10,7 +10,7 @@ use super::radiance::PixelMaterials;
 use super::surface::FilteredTile;
 use crate::base::{Cancel, Result};
 use crate::color_map::naive::NaiveMap;
-use crate::render::image::render::visible_points;
+use crate::render::image::shading_points::ShadingPoints;
 use crate::render::tile_view::{ShadedMaterials, TileScene};
 use crate::render::{CameraView, Image, RenderInput};
 
@@ -22,7 +22,7 @@ const LOWEST: f64 = 0.02;
 impl TilePixels {
     fn of(input: &RenderInput, tile_size: DVec2) -> Result<Self> {
         let view = CameraView::new(input.camera, input.mesh, input.size)?;
-        let points = visible_points(input.mesh, &view, input.samples_per_side);
+        let points = ShadingPoints::new(input.mesh, &view, input.samples_per_side);
         Ok(Self { view, points, scale: scale_of(tile_size, input), far: f64::INFINITY })
     }
 }

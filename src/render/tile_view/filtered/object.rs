@@ -7,7 +7,6 @@ use super::calibration::{Calibration, Corrections};
 use super::radiance::{PixelMaterials, PixelReflectance};
 use super::surface::FilteredTile;
 use crate::base::{Cancel, Result};
-use crate::render::image::render::visible_points;
 use crate::render::image::shading_points::ShadingPoints;
 use crate::render::tile_view::ShadedMaterials;
 use crate::render::tile_view::on_object::{TILE_RADII, anchor};
@@ -164,7 +163,7 @@ impl FilteredTile {
         if width_at(nearest) >= self.far() {
             return Ok(());
         }
-        let points = visible_points(input.mesh, &view, input.samples_per_side);
+        let points = ShadingPoints::new(input.mesh, &view, input.samples_per_side);
         let materials = PixelMaterials::new(materials);
         let Some(widths) = widths(&points, view.eye, &width_at) else { return Ok(()) };
         let calibration = &match corrections {
