@@ -25,7 +25,7 @@ def profile(scene, quality, arguments):
 
 
 def main():
-    print("| scene | edit, quality | total | CPU | visibility and product | points | shadows | shading |")
+    print("| scene | edit, quality | total | CPU and upload | visibility and product | points | shadows | shading |")
     print("|---|---|---|---|---|---|---|---|")
     for scene in SCENES:
         for edit, quality, arguments in ROWS:

@@ -19,8 +19,8 @@ struct Grid {
 @group(1) @binding(0) var<uniform> grid: Grid;
 // The first node of each ring, and the number of all nodes.
 @group(1) @binding(1) var<storage, read> starts: array<u32>;
-// G in RGB. A row for each node of the viewer holds the rings of the light; the first three azimuths of a ring follow its
-// last one.
+// G in RGB. A row for each node of the viewer holds the rings of the light; the first three azimuths of a ring follow
+// its last one.
 @group(1) @binding(2) var<storage, read> values: array<vec4f>;
 
 // Four consecutive azimuths of a ring.

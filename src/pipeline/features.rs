@@ -29,12 +29,12 @@ impl Pipeline {
     /// The properties that take no rays: mirror planes and bounced light are not looked for.
     pub(super) fn features(&self, surface: &Surface<'_>) -> Result<SceneFeatures> {
         let Surface { scene, tile, facets, sum, materials, settings, .. } = *surface;
-        let is_sliced = !tile.flat && (!tile.height_field || settings.visibility_method != VisibilityMethod::Auto);
+        let may_be_sliced = !tile.flat && (!tile.height_field || settings.visibility_method != VisibilityMethod::Auto);
         let draws_maps = !tile.flat && settings.visibility_method == VisibilityMethod::Maps;
         let gpu = if draws_maps && settings.backend != Backend::Cpu { self.env.gpu() } else { None };
         // Software Vulkan draws shadow maps far slower than the CPU, so that it is used only if a GPU is asked for.
         let maps_on_gpu = gpu.is_some_and(|gpu| settings.backend == Backend::Gpu || gpu.is_hardware());
-        let scan_work = if surface.wants_scan_work && is_sliced && !maps_on_gpu {
+        let scan_work = if surface.wants_scan_work && may_be_sliced && !maps_on_gpu {
             *self.get(EstimateScanWork { tile, facets }, &mut StageTimes::new())?
         } else {
             0.0

@@ -40,7 +40,7 @@ pub enum ProductMethod {
 /// The way to compute visibility.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum VisibilityMethod {
-    /// A horizon map if nothing overhangs, else occlusion intervals, or shadow maps on a hardware GPU.
+    /// A horizon map if nothing overhangs, else occlusion intervals.
     Auto,
     /// Occlusion intervals, from slices through the mesh along azimuths.
     OcclusionIntervals,

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use crate::base::{Cancel, Error, Result};
 use crate::effective::{EffectiveBrdf, Representation};
 use crate::gpu::{Gpu, GpuError, GpuRenderer, Tier};
+use crate::interreflection::InterreflectionTable;
 use crate::pipeline::GpuTile;
 use crate::render::RenderScene;
 
@@ -33,8 +34,10 @@ pub struct OpenGpu {
     renderer: Option<(Box<GpuRenderer>, RendererMaterial)>,
 }
 
-/// Material that a GPU renderer shades with.
-enum RendererMaterial {
+/// Material that a GPU renderer shades with, and the interreflection that a draft adds to it.
+struct RendererMaterial(MaterialSource, Option<Arc<InterreflectionTable>>);
+
+enum MaterialSource {
     Brdf(Arc<EffectiveBrdf>),
     Tile(Arc<GpuTile>),
     Nothing,
@@ -42,11 +45,12 @@ enum RendererMaterial {
 
 impl RendererMaterial {
     fn is_same(&self, other: &Self) -> bool {
-        match (self, other) {
-            (Self::Brdf(a), Self::Brdf(b)) => Arc::ptr_eq(a, b),
-            (Self::Tile(a), Self::Tile(b)) => Arc::ptr_eq(a, b),
+        let is_same_source = match (&self.0, &other.0) {
+            (MaterialSource::Brdf(a), MaterialSource::Brdf(b)) => Arc::ptr_eq(a, b),
+            (MaterialSource::Tile(a), MaterialSource::Tile(b)) => Arc::ptr_eq(a, b),
             _ => false,
-        }
+        };
+        is_same_source && self.1.as_ref().map(Arc::as_ptr) == other.1.as_ref().map(Arc::as_ptr)
     }
 }
 
@@ -173,7 +177,7 @@ impl OpenGpu {
         let outcome = match input.request.material {
             ShadedMaterial::Outcome(outcome) => outcome,
             ShadedMaterial::GpuTile(tile) => {
-                return Ok(self.set_renderer_material(input, RendererMaterial::Tile(tile.clone()))?.then_some(0.0));
+                return Ok(self.set_renderer_material(input, MaterialSource::Tile(tile.clone()))?.then_some(0.0));
             }
         };
         let mut table_ms = 0.0;
@@ -191,7 +195,7 @@ impl OpenGpu {
         // A software adapter does not evaluate sums if the CPU can read a table.
         let sums = Some(&outcome.brdf).filter(|_| self.is_hardware || shading_brdf.is_none());
         for brdf in shading_brdf.iter().chain(sums) {
-            if self.set_renderer_material(input, RendererMaterial::Brdf(brdf.clone()))? {
+            if self.set_renderer_material(input, MaterialSource::Brdf(brdf.clone()))? {
                 return Ok(Some(table_ms));
             }
         }
@@ -200,7 +204,8 @@ impl OpenGpu {
     }
 
     /// Sets the material of the renderer; returns false if the GPU does not support it.
-    fn set_renderer_material(&mut self, input: PreviewInput, material: RendererMaterial) -> Result<bool> {
+    fn set_renderer_material(&mut self, input: PreviewInput, source: MaterialSource) -> Result<bool> {
+        let material = RendererMaterial(source, input.request.bounced.cloned());
         if self.renderer.as_ref().is_some_and(|(_, last)| last.is_same(&material)) {
             return Ok(true);
         }
@@ -209,18 +214,23 @@ impl OpenGpu {
             Some((renderer, _)) => renderer,
             None => Box::new(GpuRenderer::new(gpu, input.scene.mesh(), input.scene.object_occluder())?),
         };
-        let set = match &material {
-            RendererMaterial::Brdf(brdf) => renderer.set_brdf(gpu, brdf),
-            RendererMaterial::Tile(tile) => renderer.set_tile(gpu, &tile.input),
-            RendererMaterial::Nothing => Ok(()),
+        let set = match &material.0 {
+            MaterialSource::Brdf(brdf) => renderer.set_brdf(gpu, brdf).map(|()| brdf.base_area),
+            MaterialSource::Tile(tile) => renderer.set_tile(gpu, &tile.input).map(|()| tile.input.base_area),
+            MaterialSource::Nothing => Ok(0.0),
         };
+        let set = set.and_then(|base_area| match &material.1 {
+            Some(bounced) => renderer.add_bounced(gpu, bounced, base_area),
+            None => Ok(()),
+        });
         let is_supported = match set {
             Ok(()) => true,
             Err(GpuError::Unsupported(_) | GpuError::TooLarge { .. }) => false,
             Err(error) => return Err(error.into()),
         };
         // The renderer's pipelines are reused for the next material.
-        self.renderer = Some((renderer, if is_supported { material } else { RendererMaterial::Nothing }));
+        self.renderer =
+            Some((renderer, if is_supported { material } else { RendererMaterial(MaterialSource::Nothing, None) }));
         Ok(is_supported)
     }
 

@@ -299,12 +299,8 @@ impl ImageWorker {
         } else {
             self.close = None;
         }
-        let bounced = match material {
-            ShadedMaterial::Outcome(of) if of.plan.interreflection.is_none() => {
-                self.shared.bounced_light_like(&job.loaded)
-            }
-            _ => None,
-        };
+        let has_bounced = matches!(material, ShadedMaterial::Outcome(of) if of.plan.interreflection.is_some());
+        let bounced = if has_bounced { None } else { self.shared.bounced_light_like(&job.loaded) };
         let request = RenderRequest {
             camera: &camera,
             material,

@@ -79,7 +79,7 @@ pub enum ShadedMaterial<'a> {
 pub struct RenderRequest<'a> {
     pub camera: &'a Camera,
     pub material: ShadedMaterial<'a>,
-    /// The interreflection of a similar material, for a draft on the CPU that was computed without.
+    /// The interreflection of a similar material, for a draft that was computed without.
     pub bounced: Option<&'a Arc<InterreflectionTable>>,
     pub size: [usize; 2],
     pub samples_per_side: usize,

@@ -26,9 +26,9 @@ pub const SHADERS: &[(&str, &str)] = shaders! {
         "visibility_packed_intervals", "visibility_unblocked";
     "shading": "bounds_horizons", "bounds_unblocked", "bounds_unknown", "cluster_sums", "clusters",
         "column_lobes", "column_tints", "facets", "horizon_bounds", "projected_area", "scales",
-        "shade_bounced", "shade_clusters", "shade_direct", "shade_low_rank", "shade_table", "shading_points", "shadows_bits",
-        "shadows_none", "sum_areas", "sum_cluster_areas", "sum_facets", "sum_visible_areas", "weights_area",
-        "weights_rgb";
+        "shade_bounced", "shade_clusters", "shade_direct", "shade_low_rank", "shade_table", "shading_points",
+        "shadows_bits", "shadows_none", "sum_areas", "sum_cluster_areas", "sum_facets", "sum_visible_areas",
+        "weights_area", "weights_rgb";
     "tabulate": "facet_subsets", "sample_facets", "table_areas", "table_borders", "table_nodes",
         "table_of_subsets", "table_of_sum", "table_pairs", "table_values", "two_lobes";
     "color_map": "color_pixels", "color_reads";

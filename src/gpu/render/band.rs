@@ -1,8 +1,8 @@
 //! GPU buffers of one image: its samples, and the points of bands of its rows.
 //!
-//! Bands use the same buffers in turn, so that memory is bounded; only points and light visibility have buffers for
-//! each band if all fit. The parameters of each band are in small uniform blocks of its own, which are written before
-//! the submission.
+//! Bands use the same buffers in turn, so that memory is bounded. If the points and the light visibility of all bands
+//! fit, each band has its own buffers for them. The parameters of each band are in small uniform blocks of its own, which
+//! are written before the submission.
 
 use std::ops::Range;
 

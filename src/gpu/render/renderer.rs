@@ -14,6 +14,7 @@ use crate::effective::{EffectiveBrdf, GpuTileInput, GpuVisibilityInput, HeightMa
 use crate::gpu::shading::visibility::GpuVisibility;
 use crate::gpu::shading::{GpuLight, GpuMaterial, GpuShading};
 use crate::gpu::{Gpu, GpuError, GpuHeightMarch, GpuShadowMaps, GpuSlicer, Tier, shading};
+use crate::interreflection::InterreflectionTable;
 use crate::render::image::render::{RenderTimes, check_size};
 use crate::render::image::tone_map::{ToneCurve, ToneMap};
 use crate::render::shadow::Occluder;
@@ -149,6 +150,22 @@ impl GpuRenderer {
         Ok(())
     }
 
+    /// Adds interreflection to the material, which has none: that of a similar tile whose base area is `base_area`.
+    ///
+    /// # Errors
+    /// Errors of the GPU.
+    pub fn add_bounced(
+        &mut self,
+        gpu: &Gpu,
+        table: &InterreflectionTable,
+        base_area: f64,
+    ) -> std::result::Result<(), GpuError> {
+        if let Some(material) = &mut self.material {
+            self.shading.add_bounced(gpu, material, table, base_area, self.rays.is_some())?;
+        }
+        Ok(())
+    }
+
     /// Renders the object of the renderer and reads the image back. Of `input.mesh` only the bounds are used;
     /// `input.reflectance` and `input.shadow_cache` are not used.
     ///
@@ -195,7 +212,9 @@ impl GpuRenderer {
     ) -> Result<RenderTimes> {
         let view = CameraView::new(input.camera, input.mesh, input.size)?;
         let work = self.material.as_ref().map_or(1, |material| material.work(input.lights.len()).max(1));
-        let points = usize::try_from(self.max_work / work).unwrap_or(usize::MAX);
+        let all = input.size[0] * input.size[1] * input.samples_per_side * input.samples_per_side;
+        // Materials whose work fits into one submission share the buffers.
+        let points = usize::try_from(self.max_work / work).unwrap_or(usize::MAX).min(all);
         let sizes = BufferSizes {
             size: input.size,
             samples_per_side: input.samples_per_side,

@@ -38,7 +38,7 @@ fn a_tile_that_the_gpu_computes_from_its_facets_has_the_same_image_as_on_the_cpu
         }
         loaded.scene.effects.picture_table = if tabulated { scene::Switch::On } else { scene::Switch::Off };
         if expected == "maps" {
-            // By default, only a real GPU draws shadow maps.
+            // Software Vulkan draws maps only if a GPU is asked for.
             let quality = &mut loaded.scene.quality;
             (quality.visibility, quality.backend) = (Some("maps".to_owned()), "gpu".to_owned());
             (quality.azimuths, quality.rings) = (Some(10), Some(5));

@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::{GpuShading, Pass, SecondGroup, Variant, shadow_swap};
+use super::{GpuMaterial, GpuShading, Pass, SecondGroup, Variant, shadow_swap};
 use crate::gpu::{Gpu, GpuError};
 use crate::interreflection::InterreflectionTable;
 
@@ -20,14 +20,15 @@ struct Grid {
 const READS_PER_PAIR: u64 = 256;
 
 impl GpuShading {
-    /// The pass divides by the projected area that the passes before it leave in the scales of points.
-    pub(super) fn bounced_pass(
+    /// Adds the pass to a material. It multiplies by the scales (1/a_v) that the passes of direct reflection write.
+    pub(crate) fn add_bounced(
         &mut self,
         gpu: &Gpu,
+        material: &mut GpuMaterial,
         table: &InterreflectionTable,
         base_area: f64,
         shadowed: bool,
-    ) -> Result<Pass, GpuError> {
+    ) -> Result<(), GpuError> {
         let starts: Vec<u32> = (0..=table.grid.ring_count()).map(|ring| table.grid.first_node(ring) as u32).collect();
         let values = table.rgb_rows();
         let grid = Grid {
@@ -50,11 +51,12 @@ impl GpuShading {
             constants: Vec::new(),
         };
         let resources: Vec<_> = bound.iter().map(wgpu::Buffer::as_entire_binding).collect();
-        Ok(Pass {
+        material.passes.push(Pass {
             pipeline: self.pipeline(gpu, variant, SecondGroup::Factors)?,
             group: gpu.group("factors", &self.factors, &resources)?,
             work: READS_PER_PAIR,
             each_light: true,
-        })
+        });
+        Ok(())
     }
 }

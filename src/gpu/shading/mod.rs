@@ -145,7 +145,7 @@ impl GpuShading {
             Representation::Interreflecting(direct, bounced) => {
                 let direct = EffectiveBrdf { representation: (**direct).clone(), base_area: brdf.base_area };
                 let mut material = self.material(gpu, &direct, shadowed)?;
-                material.passes.push(self.bounced_pass(gpu, bounced, brdf.base_area, shadowed)?);
+                self.add_bounced(gpu, &mut material, bounced, brdf.base_area, shadowed)?;
                 return Ok(material);
             }
             Representation::Table(table) => vec![self.table_pass(gpu, table, shadowed)?],

@@ -2,8 +2,7 @@
 //! [`OcclusionIntervals::scan`](crate::visibility::OcclusionIntervals::scan) and
 //! [`HorizonMap::scan`](crate::visibility::HorizonMap::scan). The result stays on the GPU for shading.
 //!
-//! A slice stores at most four overhangs. If there are more, the fourth covers all above the third. The share of
-//! such slices is printed by `cargo bench --bench measure -- slice-steps`.
+//! A slice stores at most four overhangs. If there are more, the fourth covers all above the third.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{IVec2, Vec2, Vec3};

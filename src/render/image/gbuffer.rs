@@ -33,8 +33,10 @@ pub struct GBuffer {
     pub tangents: Vec<Vec3>,
 }
 
-/// Rows of samples per band, rounded up to whole pixels.
+/// Most rows of samples per band, rounded up to whole pixels.
 const BAND: usize = 16;
+/// Bands of a small image, so that all processors have some.
+const MIN_BANDS: usize = 64;
 
 impl GBuffer {
     /// Rasterises the mesh with `samples_per_side²` samples per pixel.
@@ -44,18 +46,20 @@ impl GBuffer {
     }
 
     /// Calls `of` with the first row of pixels and the G-buffer of each band of rows, in parallel, and returns the results
-    /// in order. A band fits into a processor's cache, which an image does not.
+    /// in order. Less memory is written than for a whole image.
     pub fn map_bands<T: Send>(
         mesh: &ObjectMesh,
         view: &CameraView,
         samples_per_side: usize,
         of: impl Fn(usize, Self) -> T + Sync,
     ) -> Vec<T> {
-        let pixel_rows = BAND.div_ceil(samples_per_side);
         let size = view.size.map(|n| n * samples_per_side);
+        let pixel_rows = BAND.min(size[1].div_ceil(MIN_BANDS)).div_ceil(samples_per_side);
         let projection = Projection::new(mesh, view, size, pixel_rows * samples_per_side);
-        let of_band =
-            |band: usize| of(band * pixel_rows, Self::of_samples(mesh, view, size[0], &projection.samples(band)));
+        let of_band = |band: usize| {
+            let buffer = Self::of_samples(mesh, view, size[0], &projection.samples(band));
+            of(band * pixel_rows, buffer)
+        };
         (0..projection.band_count()).into_par_iter().map(of_band).collect()
     }
 

@@ -12,7 +12,8 @@ use crate::render::shadow::{LightVisibility, Occluder};
 use crate::render::{CameraView, DirectionalLight, Image, ObjectMesh};
 use crate::scene;
 
-/// Bounds the samples (pixels times samples per pixel) of one image; the G-buffer takes up to 56 bytes per sample.
+/// Bounds the samples (pixels times samples per pixel) of one image; a shading point takes 48 bytes, and most pixels need
+/// one.
 pub const MAX_SAMPLES: usize = 1 << 25;
 
 /// Everything that an image depends on.
