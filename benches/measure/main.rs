@@ -178,7 +178,11 @@ fn capture(_: Option<&str>, table: &mut Table) -> Result<(), String> {
 }
 
 fn capture_sheet(sheet: Option<&str>, table: &mut Table) -> Result<(), String> {
-    capture_sheet::capture_sheet(sheet, &mut |line| table.line(line))
+    match sheet {
+        // The page holds the figures of all sheets.
+        Some(_) => capture_sheet::capture_sheet(sheet, &mut |line| println!("{line}")),
+        None => capture_sheet::capture_sheet(None, &mut |line| table.line(line)),
+    }
 }
 
 fn slabs(_: Option<&str>, table: &mut Table) -> Result<(), String> {
