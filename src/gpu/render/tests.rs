@@ -212,7 +212,7 @@ fn an_image_for_a_screen_is_the_tone_mapped_image_that_is_read_back() {
         let shown_image = gpu.read_image(&texture).unwrap();
         for (pixel, shown) in image.pixels.iter().zip(shown_image.as_chunks::<4>().0) {
             let expected = tone_map.apply(*pixel).to_array().map(|linear| 255.0 * srgb(linear));
-            // Adapters may be off by 0.6 of a step when they convert to bytes (Direct3D 11.3 specification, 3.2.3.6).
+            // Adapters may be off by 0.6 of a step when they convert to bytes (Direct3D's data conversion rules).
             let off = (0..3).map(|c| (expected[c] - f32::from(shown[c])).abs()).fold(0.0, f32::max);
             assert!(off < 0.61 && shown[3] == 255, "{expected:?} {shown:?}");
         }
