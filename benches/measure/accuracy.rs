@@ -8,7 +8,8 @@ use biscale::pipeline::Pipeline;
 use biscale::plan::{Preset, Settings};
 use biscale::reference::ReferenceSettings;
 
-use crate::tiles::{BRDFS, evaluate, merl_spec, open, reference, untuned};
+use crate::reference::reference;
+use crate::tiles::{BRDFS, evaluate, merl_spec, open, untuned};
 
 /// Presets with the least PSNR [dB] and the largest relative L2 that they must reach.
 const BOUNDS: [(&str, f64, f64); 5] = [

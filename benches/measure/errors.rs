@@ -9,7 +9,7 @@ use biscale::report::svg::{Chart, LogAxis};
 use biscale::scene::{self, LoadedScene};
 
 use crate::hard_tiles::{Measured, PAIRS_SEED, RayCast, TrueValues, all, measure};
-use crate::tiles::reference;
+use crate::reference::reference;
 
 const PRESETS: [&str; 2] = ["draft", "standard"];
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=3;

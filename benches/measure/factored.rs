@@ -59,7 +59,7 @@ pub fn factored(print: &mut dyn FnMut(String)) -> Result<(), String> {
             };
             let ((direct, _), (factors, outcome)) = (of("direct"), of("low_rank"));
             let stated = outcome.errors().unwrap().estimate();
-            let warned = outcome.health().warnings.iter().any(|warning| warning.contains("error is estimated at"));
+            let warned = outcome.health().warnings.iter().any(|warning| warning.contains("the stated error is"));
             let factor = (factors.rel_l2 / stated.rel_l2).max(stated.rel_l2 / factors.rel_l2);
             let exceeds = factors.rel_l2 > 0.1 || factors.psnr_db < 35.0;
             if exceeds && (!warned || factor > MAX_FACTOR) {

@@ -19,6 +19,8 @@ mod in_tests;
 mod interpolation;
 mod interreflection;
 mod rays;
+#[path = "../../tests/numerics/reference.rs"]
+mod reference;
 mod shading_tables;
 mod slabs;
 mod table;

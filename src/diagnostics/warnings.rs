@@ -41,9 +41,9 @@ pub fn of(health: &Health, limits: Limits, conserving: bool) -> Vec<String> {
     warnings
 }
 
-/// A warning if the estimated error exceeds what the preset allows.
+/// A warning if the stated error exceeds what the preset allows.
 pub fn of_error(estimate: &ErrorEstimate, limits: Limits) -> Option<String> {
-    let bound = limits.error.filter(|bound| estimate.may_exceed(*bound))?;
+    let bound = limits.error.filter(|bound| estimate.exceeds(*bound))?;
     let decibels = |psnr: Option<f64>| psnr.map_or_else(String::new, |psnr| format!(", {psnr:.1} dB"));
     let ErrorEstimate { facets, visibility, table, .. } = *estimate;
     let remedy = if table > facets.max(visibility) {
@@ -54,7 +54,7 @@ pub fn of_error(estimate: &ErrorEstimate, limits: Limits) -> Option<String> {
         "use a finer preset, or make the tile shallower"
     };
     Some(format!(
-        "the error is estimated at {}{} with an uncertainty of a quarter, and `{}` allows {}{}: {remedy}",
+        "the stated error is {}{}, and `{}` allows {}{}: {remedy}",
         percent(estimate.rel_l2),
         decibels(estimate.psnr_db),
         limits.preset,

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::Direct;
-use super::error_estimate::{ErrorBound, ErrorEstimate, PAIRS, PAIRS_SEED, PairCount, Totals, f_bar_at};
+use super::error_estimate::{ErrorBound, ErrorEstimate, PAIRS, PAIRS_SEED, PairCount, SAFETY_FACTOR, Totals, f_bar_at};
 use crate::geometry::Facets;
 use crate::interreflection::InterreflectionTable;
 use crate::metrics::{Pair, mirror_biased_pairs};
@@ -20,7 +20,7 @@ const COARSE: Resolution = Resolution { azimuth_step: 2, softness: 2.0 };
 pub(crate) fn quick_estimate(direct: &Direct, facets: &Facets) -> (ErrorEstimate, PairValues) {
     let exact_facets = facets.replicates.is_empty();
     let has_coarse = direct.visibility.has_azimuth_step(COARSE.azimuth_step);
-    let mut estimate = ErrorEstimate::of_table(0.0);
+    let mut estimate = ErrorEstimate::default();
     if exact_facets && !has_coarse {
         return (estimate, PairValues::default());
     }
@@ -46,9 +46,9 @@ pub(crate) fn quick_estimate(direct: &Direct, facets: &Facets) -> (ErrorEstimate
         (f_bar, (difference / area).length_squared() + coarse.length_squared(), area)
     };
     let all = QUICK_PAIRS.evaluate(deviations, |at| at.0);
-    let totals = Totals::of(all.iter().map(|at| at.0));
+    let totals = Totals::of(all.iter().map(|at| (1.0, at.0)));
     if totals.norm > 0.0 {
-        estimate.rel_l2 = (all.iter().map(|at| at.1).sum::<f64>() / totals.norm).sqrt();
+        estimate.rel_l2 = SAFETY_FACTOR * (all.iter().map(|at| at.1).sum::<f64>() / totals.norm).sqrt();
         estimate.psnr_db = totals.psnr_db(estimate.rel_l2);
     }
     (estimate, PairValues(all.into_iter().map(|(f_bar, _, area)| (f_bar, area)).collect()))
@@ -79,9 +79,10 @@ pub(crate) fn estimate_of_bounced(
             if area > 0.0 { [f_bar + g / area, g / area] } else { [DVec3::ZERO; 2] }
         };
         let all: Vec<[DVec3; 2]> = pairs.iter().zip(values).map(of_pair).collect();
-        let totals = Totals::of(all.iter().map(|at| at[0]));
+        let totals = Totals::of(all.iter().map(|at| (1.0, at[0])));
         let of_bounced: f64 = all.iter().map(|at| at[1].length_squared()).sum();
-        let rel_l2 = if totals.norm > 0.0 { bounced.rel_error() * (of_bounced / totals.norm).sqrt() } else { 0.0 };
+        let part = if totals.norm > 0.0 { (of_bounced / totals.norm).sqrt() } else { 0.0 };
+        let rel_l2 = SAFETY_FACTOR * bounced.rel_error() * part;
         let psnr_db = totals.psnr_db(rel_l2);
         ErrorEstimate { rel_l2, psnr_db, interreflection: rel_l2, ..ErrorEstimate::default() }
     };

@@ -50,8 +50,8 @@ fn a_difficult_tile_is_refined_until_it_states_an_error_within_the_bound() {
             && outcome.settings.horizon_azimuths > plain.settings.horizon_azimuths
     );
     let estimate = outcome.errors().unwrap().estimate();
-    let warns = outcome.health().warnings.iter().any(|warning| warning.contains("error is estimated at"));
-    assert_eq!(warns, estimate.may_exceed(bound), "{estimate:?}");
+    let warns = outcome.health().warnings.iter().any(|warning| warning.contains("the stated error is"));
+    assert_eq!(warns, estimate.exceeds(bound), "{estimate:?}");
 }
 
 #[test]
@@ -60,8 +60,8 @@ fn limits_end_refinement_and_a_warning_states_the_error() {
     let loaded = open("fig8d_leather", "standard", &["quality.max_facets=16", mirror]);
     let outcome = effective(&loaded);
     let estimate = outcome.errors().unwrap().estimate();
-    assert!(estimate.may_exceed(outcome.settings.error_bound().unwrap()), "{estimate:?}");
-    let warning = outcome.health().warnings.iter().find(|warning| warning.contains("error is estimated at")).unwrap();
+    assert!(estimate.exceeds(outcome.settings.error_bound().unwrap()), "{estimate:?}");
+    let warning = outcome.health().warnings.iter().find(|warning| warning.contains("the stated error is")).unwrap();
     assert!(warning.contains("`standard` allows 10 %"), "{warning}");
 }
 
@@ -97,8 +97,8 @@ fn light_between_facets_is_refined_until_its_error_is_within_the_bound() {
     let plain = effective(&open("default", "draft", &[&MIRRORS[..], &["quality.adaptive=false"]].concat()));
     let bound = refined.settings.error_bound().unwrap();
     let stated = |outcome: &Outcome| outcome.errors().unwrap().estimate();
-    assert!(stated(&plain).may_exceed(bound), "{:?}", stated(&plain));
-    assert!(!stated(&refined).may_exceed(bound), "{:?}", stated(&refined));
+    assert!(stated(&plain).exceeds(bound), "{:?}", stated(&plain));
+    assert!(!stated(&refined).exceeds(bound), "{:?}", stated(&refined));
     let note = "interreflection refined to ";
     assert!(refined.notes.iter().any(|text| text.starts_with(note)), "{:?}", refined.notes);
     assert!(plain.notes.is_empty(), "{:?}", plain.notes);

@@ -24,7 +24,7 @@ const REFERENCE_LEAD_DB: f64 = 4.0;
 /// error.
 const MAX_CORRECTION: f64 = 8.0;
 /// Standard error of a stated PSNR [dB]: the RMS of stated over true error (`cargo bench --bench measure -- errors`).
-const STATED_STD_ERROR_DB: f64 = 5.8;
+const STATED_STD_ERROR_DB: f64 = 3.5;
 /// Smallest standard error of a PSNR from the pairs of the reference [dB] (`cargo bench --bench measure -- choosing`).
 const MIN_STD_ERROR_DB: f64 = 2.5;
 

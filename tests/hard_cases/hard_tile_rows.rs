@@ -5,7 +5,6 @@ use std::collections::BTreeSet;
 use biscale::metrics::{Pair, compare, mirror_biased_pairs};
 use biscale::pipeline::Pipeline;
 use biscale::reference::ReferenceSettings;
-use biscale::scene::LoadedScene;
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -14,6 +13,7 @@ use crate::evaluators::Evaluator;
 use crate::examination::{measured, pairs};
 use crate::hard_tiles::{HardTile, Measured, PAIRS_SEED, RayCast, TrueValues, Truth, all, measure};
 use crate::invariants::{assert_none, violations};
+use crate::reference::reference;
 
 /// Tiles of the ordinary tests. Each has a closed form and takes less than a second.
 const QUICK: [&str; 6] = [
@@ -132,41 +132,23 @@ fn grooves_whose_bottom_few_pairs_see_state_their_error() {
     }
 }
 
-/// The program's reference at many pairs.
-fn reference(loaded: &LoadedScene, pairs: &[Pair]) -> TrueValues {
-    let settings = ReferenceSettings { facets: 16_384, max_passes: 64, target: 0.01, seed: 1 };
-    let mut std_error = 0.0;
-    let estimates = Pipeline::new()
-        .with_reference(loaded, |reference| {
-            reference.estimate(pairs, &settings, |_, error| {
-                std_error = error;
-                true
-            })
-        })
-        .unwrap();
-    TrueValues { values: estimates.iter().map(|estimate| estimate.f_bar).collect(), std_error }
-}
-
 /// `cargo bench --bench measure -- errors` measures `draft` and `standard`.
 #[test]
 #[ignore = "minutes: 24 tiles with up to 131,072 facets"]
 fn hard_tiles_at_fine_are_within_the_bound_or_warn_of_their_error() {
     const RAYS: RayCast = RayCast { points: 4096, max_passes: 16, target: 4e-3 };
     let mut silent = Vec::new();
-    // Level tiles are exact. Sheets with holes take minutes, because refinement goes to its limits; they warn. Needles are
-    // 1 dB short, and state half of their error.
-    const LEFT_OUT: [&str; 2] = ["hole", "needles"];
-    let is_examined = |tile: &HardTile| {
-        !matches!(tile.truth, Truth::Level(_)) && !LEFT_OUT.iter().any(|name| tile.name.contains(name))
-    };
+    const REFERENCE: ReferenceSettings = ReferenceSettings { facets: 16_384, max_passes: 64, target: 0.01, seed: 1 };
+    // Level tiles are exact. Sheets with holes take minutes, because refinement goes to its limits; they warn.
+    let is_examined = |tile: &HardTile| !matches!(tile.truth, Truth::Level(_)) && !tile.name.contains("hole");
     for tile in all().into_iter().filter(is_examined) {
         let folder = tempfile::tempdir().unwrap();
         let loaded = tile.open(folder.path(), "fine", 1);
-        let (pairs, truth) = if tile.name == "leaning hairs" {
-            // Of 200 pairs, a single one at grazing angles would hold most of the squared error.
+        let (pairs, truth) = if ["leaning hairs", "needles"].contains(&tile.name) {
+            // Of 200 pairs, a single one would hold most of the squared error.
             let pairs = mirror_biased_pairs(1200, PAIRS_SEED);
-            let truth = reference(&loaded, &pairs);
-            (pairs, truth)
+            let (values, std_error) = reference(&Pipeline::new(), &loaded, &pairs, &REFERENCE);
+            (pairs, TrueValues { values, std_error })
         } else {
             tile.pairs_and_values(&loaded, 200, &RAYS)
         };

@@ -20,6 +20,8 @@ mod measured_files;
 #[cfg(feature = "gpu")]
 mod on_gpu;
 mod hard_tile_rows;
+#[path = "../numerics/reference.rs"]
+mod reference;
 mod refinement;
 mod statistics;
 mod sums;

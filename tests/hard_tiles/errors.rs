@@ -37,7 +37,7 @@ pub fn measure(loaded: &LoadedScene, preset: &str, seed: u64, pairs: &[Pair], tr
     let rel_l2 = (found.rel_l2.powi(2) - truth.std_error.powi(2)).max(least).sqrt().min(found.rel_l2);
     let psnr_db = found.psnr_db + 20.0 * (found.rel_l2.max(1e-12) / rel_l2.max(1e-12)).log10();
     let stated = outcome.errors().unwrap().estimate().rel_l2;
-    let warns = outcome.health().warnings.iter().any(|warning| warning.contains("error is estimated at"));
+    let warns = outcome.health().warnings.iter().any(|warning| warning.contains("the stated error is"));
     let is_resolved = found.rel_l2 > 2.0 * truth.std_error;
     Measured { errors: Errors { rel_l2, psnr_db }, stated, warns, is_resolved }
 }

@@ -11,7 +11,8 @@ use glam::{Vec2, Vec3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::tiles::{BRDFS, evaluate, merl_spec, open, reference, untuned};
+use crate::reference::reference;
+use crate::tiles::{BRDFS, evaluate, merl_spec, open, untuned};
 
 #[path = "../../src/testing/measured_data.rs"]
 mod measured_data;

@@ -5,6 +5,7 @@ mod accuracy;
 mod choosing;
 mod images;
 mod low_rank;
+mod reference;
 mod settings;
 mod stages;
 mod tiles;

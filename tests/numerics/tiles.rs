@@ -8,8 +8,6 @@ use biscale::effective::EffectiveBrdf;
 use biscale::geometry;
 use biscale::geometry::{FacetSampler, Facets, PeriodicGrid, SampleShift, TileMesh};
 use biscale::metrics::Pair;
-use biscale::pipeline::Pipeline;
-use biscale::reference::ReferenceSettings;
 use biscale::scene;
 use biscale::scene::LoadedScene;
 use biscale::visibility::{HorizonMap, OcclusionIntervals, Visibility};
@@ -84,25 +82,6 @@ pub fn merl_spec(path: &Path) -> String {
 
 pub fn evaluate(brdf: &EffectiveBrdf, pairs: &[Pair]) -> Vec<Vec3> {
     pairs.par_iter().map(|pair| brdf.eval(pair.i, pair.o)).collect()
-}
-
-/// Returns the reference at the pairs, and the relative L2 of its standard errors.
-pub fn reference(
-    pipeline: &Pipeline,
-    scene: &LoadedScene,
-    pairs: &[Pair],
-    settings: &ReferenceSettings,
-) -> (Vec<Vec3>, f64) {
-    let mut std_error = 0.0;
-    let estimates = pipeline
-        .with_reference(scene, |reference| {
-            reference.estimate(pairs, settings, |_, error| {
-                std_error = error;
-                true
-            })
-        })
-        .unwrap();
-    (estimates.iter().map(|estimate| estimate.f_bar).collect(), std_error)
 }
 
 /// Returns the mesh of a tile without files.
