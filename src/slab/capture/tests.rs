@@ -14,12 +14,14 @@ fn beckmann(x: f64, y: f64, alpha: f64) -> KnownPoint {
 
 #[test]
 fn lobes_at_new_views_come_back_within_3_3_and_5_per_cent_at_noise_0_1_and_5_per_cent() {
-    for alpha in [0.0, 0.5, 1.0] {
-        for (noise, bound) in [(0.0, 0.02), (0.01, 0.03), (0.05, 0.05)] {
-            let found = beckmann(0.2, 0.2, alpha).recovered(&[45.0], noise).unwrap();
-            assert!(found.error < bound, "{alpha}, {noise}: {}", found.error);
+    let ggx = |alpha: f64| KnownPoint::analytic(Profile::Ggx, DVec2::splat(0.2), alpha).unwrap();
+    let of_shapes = |alpha: f64| [beckmann(0.2, 0.2, alpha), beckmann(0.3, 0.1, alpha), ggx(alpha)];
+    for (noise, bound) in [(0.0, 0.03), (0.01, 0.03), (0.05, 0.05)] {
+        for (shape, known) in [0.0, 0.25, 0.75, 1.0].into_iter().flat_map(of_shapes).enumerate() {
+            let found = known.recovered(&[45.0], noise).unwrap();
+            assert!(found.error < bound, "{shape}, {noise}: {}", found.error);
             let scale = found.fitted.scale;
-            assert!((scale - 1.0).abs() < 0.06, "{alpha}, {noise}: {scale}");
+            assert!((scale - 1.0).abs() < 0.08, "{shape}, {noise}: {scale}");
         }
     }
 }
@@ -34,7 +36,7 @@ fn alpha_comes_back_to_0_03_for_isotropic_and_to_0_05_for_anisotropic_slopes() {
         let ggx = KnownPoint::analytic(Profile::Ggx, DVec2::splat(0.2), alpha).unwrap();
         let found = ggx.recovered(&[45.0], 0.0).unwrap();
         let error = (found.fitted.model.alpha - alpha).abs();
-        assert!(error < 0.03 && found.error < 0.06, "GGX, {alpha}: {error} {}", found.error);
+        assert!(error < 0.03 && found.error < 0.03, "GGX, {alpha}: {error} {}", found.error);
     }
 }
 
@@ -49,6 +51,7 @@ fn two_cameras_find_alpha_of_a_sawtooth_to_0_05_and_one_does_not() {
     }
     let one = KnownPoint::sawtooth(0.5).unwrap().recovered(&[45.0], 0.0).unwrap();
     assert!((one.fitted.model.alpha - 0.5).abs() > 0.1 || one.error > 0.1, "{}", one.error);
+    assert!(one.fitted.model.skewness() > 0.1, "{}", one.fitted.model.skewness());
 }
 
 #[test]
