@@ -94,7 +94,7 @@ plt.show()
 # %% [markdown]
 # ## What accuracy costs
 #
-# A preset is a named set of accuracy settings. `brdf.error` summarises the estimate: `rel_l2` is the expected relative L2 over such pairs.
+# A preset is a named set of accuracy settings. `brdf.error` summarises the estimate: `rel_l2` is 1.3 times the expected relative L2 over such pairs.
 # It exists for every result, so you need a reference only if you want to check it. The grey line is the error that the reference itself adds
 # to every measured difference.
 

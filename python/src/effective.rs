@@ -347,7 +347,7 @@ impl EffectiveBrdf {
         }
     }
 
-    /// The estimated error of the result, or None: with the paper's method and for slabs.
+    /// The stated error of the result, or None: with the paper's method and for slabs.
     #[getter]
     fn error<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let estimate = match &self.result {

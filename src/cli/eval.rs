@@ -165,7 +165,7 @@ struct Report {
     pairs: usize,
     #[serde(rename = "form")]
     representation: String,
-    /// Estimated error; absent for a reference, and for the paper's method.
+    /// Stated error; absent for a reference, and for the paper's method.
     error: Option<ErrorEstimate>,
     health: Health,
 }

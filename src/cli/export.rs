@@ -40,7 +40,7 @@ pub struct Report {
     representation: String,
     /// Directional-hemispherical reflectances: theta and phi in degrees, then R, G, B.
     reflectance: Vec<[f32; 5]>,
-    /// Estimated error of the effective BRDF.
+    /// Stated error of the effective BRDF.
     error: Option<ErrorEstimate>,
     health: Health,
 }

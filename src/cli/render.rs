@@ -35,7 +35,7 @@ struct Report<'a> {
     /// Representation of the effective BRDF that was read.
     reads: String,
     stages: serde_json::Map<String, serde_json::Value>,
-    /// Estimated error of the effective BRDF, without that of the representation that was read.
+    /// Stated error of the effective BRDF, without that of the representation that was read.
     error: Option<ErrorEstimate>,
     health: &'a Health,
 }

@@ -4,7 +4,8 @@
 //! the error of the facets is distributed over direction pairs. Its size follows from the difference from a second sample
 //! of fewer facets, because replicates are less even than the whole sample. Visibility from a half and from a quarter
 //! of the azimuths shows the order and the error of interpolation between azimuths (Richardson 1911), and a soft step of
-//! half the width that of the soft step.
+//! half the width that of the soft step. Pairs of nearly equal directions are examined more often than they are drawn. The
+//! stated error of the whole BRDF is [`SAFETY_FACTOR`] times the estimate.
 
 use std::sync::Arc;
 
@@ -32,8 +33,9 @@ const RETROREFLECTION_FACTOR: usize = 8;
 const RETROREFLECTION_ANGLE: f32 = 0.15;
 /// Seed of the sequence.
 const RETROREFLECTION_SEED: u64 = 20_261_127;
-/// Ratio of the error of these pairs to [`Deviations::blended`]. It is -1 where both directions see past the same edges, and 2
-/// where they see past different ones, so that nothing is common to them.
+/// Size of the error relative to [`Deviations::blended`], where what blocks is narrower than the steps between azimuths. The sum
+/// multiplies two visibilities that are blended from two azimuths. If both directions see past the same edges, the product
+/// should be `v` in place of `v²`, and the error is -1; if they see past independent edges, it is 2 on average.
 const BLENDED_RATIO: f64 = 1.5;
 /// Ratio of a stated error to the estimate of the expected one, about which the error of a single result scatters. With this
 /// ratio, none of the tiles of `cargo bench --bench measure -- errors` states less than a third of its true error or exceeds
@@ -100,6 +102,11 @@ impl ErrorEstimate {
         if percent < 0.1 { format!("{percent:.3} %{psnr}") } else { format!("{percent:.1} %{psnr}") }
     }
 
+    /// The relative L2 without [`SAFETY_FACTOR`].
+    pub fn expected_rel_l2(&self) -> f64 {
+        self.rel_l2 / SAFETY_FACTOR
+    }
+
     /// Returns true if the stated error exceeds a bound.
     pub fn exceeds(&self, bound: ErrorBound) -> bool {
         self.excess(bound) > 1.0
@@ -142,9 +149,8 @@ struct Deviations {
     replicates: [DVec3; REPLICATES],
     /// `f̄` with half of the azimuths less `f̄`, and with a quarter less `f̄` with half.
     coarse: [DVec3; 2],
-    /// Near retroreflection, reflection by the visibilities `v` between azimuths, each times `1 - v`. If what blocks is narrower
-    /// than the steps between azimuths, blended visibilities of nearly equal directions are fractions that are too alike,
-    /// whatever the steps, so that coarser ones do not show it.
+    /// Near retroreflection, `f̄` with `v_i (1 - v_i)` in place of `v_i v_o`: it shows how much of the visibility is a blend
+    /// of two azimuths. Fewer azimuths give blends as well, so that `coarse` does not show this error.
     blended: DVec3,
     /// `f̄` with a soft step of half the width less `f̄`.
     sharper: DVec3,
@@ -269,12 +275,12 @@ impl ErrorEstimator {
         estimator
     }
 
-    /// The estimate for the whole BRDF.
+    /// The stated error of the whole BRDF.
     pub fn estimate(&self) -> ErrorEstimate {
         self.estimate
     }
 
-    /// Standard error of `f̄` at each pair, times [`SAFETY_FACTOR`].
+    /// Standard error of `f̄` at each pair, without [`SAFETY_FACTOR`].
     pub fn standard_errors(&self, pairs: &[Pair]) -> Vec<Vec3> {
         let of = |deviations: Deviations| {
             let facets = deviations.random_variance() * self.variance_ratio;
@@ -282,16 +288,16 @@ impl ErrorEstimator {
             let blended = deviations.blended * BLENDED_RATIO;
             let soft_step = deviations.sharper * self.soft_step_ratio;
             let visibility = azimuths * azimuths + blended * blended + soft_step * soft_step;
-            let table = deviations.f_bar * self.estimate.table;
+            let table = deviations.f_bar * (self.estimate.table / SAFETY_FACTOR);
             let bounced = deviations.bounced * self.rel_error_of_bounced();
-            let direct = (facets + visibility) * (SAFETY_FACTOR * SAFETY_FACTOR);
-            (direct + table * table + bounced * bounced).map(f64::sqrt).as_vec3()
+            (facets + visibility + table * table + bounced * bounced).map(f64::sqrt).as_vec3()
         };
         pairs.par_iter().map(|pair| of(self.deviations(None, *pair))).collect()
     }
 
+    /// Relative error of the light between facets; 0 if it is left out.
     fn rel_error_of_bounced(&self) -> f64 {
-        self.bounced.as_ref().map_or(0.0, |(bounced, _)| SAFETY_FACTOR * bounced.rel_error())
+        self.bounced.as_ref().map_or(0.0, |(bounced, _)| bounced.rel_error())
     }
 
     fn examine(&mut self, second: Option<&Direct>, table: f64) {
@@ -321,14 +327,13 @@ impl ErrorEstimator {
         self.azimuth_ratio = 1.0 / (2.0_f64.powf(order.clamp(least_order, MOST_ORDER)) - 1.0);
         let sharper = size(&|at| at.sharper);
         self.soft_step_ratio = 1.0 / (1.0 - 2.0_f64.powf(-least_order));
-        let relative = |squares: f64| (squares / totals.norm).sqrt();
-        let stated = |squares: f64| SAFETY_FACTOR * relative(squares);
+        let stated = |squares: f64| SAFETY_FACTOR * (squares / totals.norm).sqrt();
         let blended = BLENDED_RATIO * size(&|at| at.blended);
         let azimuths = stated((self.azimuth_ratio * half).powi(2) + blended * blended);
-        let soft_step = self.soft_step_ratio * stated(sharper * sharper);
+        let soft_step = stated((self.soft_step_ratio * sharper).powi(2));
         let (facets, visibility) = (stated(variance), azimuths.hypot(soft_step));
         let bounced = total(&|at| at.bounced.length_squared());
-        let interreflection = self.rel_error_of_bounced() * relative(bounced);
+        let interreflection = self.rel_error_of_bounced() * stated(bounced);
         let rel_l2 = facets.hypot(visibility).hypot(table).hypot(interreflection);
         let psnr_db = totals.psnr_db(rel_l2);
         self.estimate =
@@ -349,7 +354,8 @@ impl ErrorEstimator {
 
     fn deviations(&self, second: Option<&Direct>, pair: Pair) -> Deviations {
         let Pair { i, o } = pair;
-        let weight = if is_near_retroreflection(&pair) { 1.0 / RETROREFLECTION_FACTOR as f64 } else { 1.0 };
+        let is_near = is_near_retroreflection(&pair);
+        let weight = if is_near { 1.0 / RETROREFLECTION_FACTOR as f64 } else { 1.0 };
         let mut deviations = Deviations { weight, ..Deviations::default() };
         if i.z <= 0.0 || o.z <= 0.0 {
             return deviations;
@@ -357,7 +363,7 @@ impl ErrorEstimator {
         let mut blended = DVec3::ZERO;
         // Projected area and reflection of each replicate, or of all facets.
         let parts: Vec<(f64, DVec3)> = self.direct.with_visibility(i, o, |v_i, v_o| {
-            if is_near_retroreflection(&pair) {
+            if is_near {
                 let blocked: Vec<f32> = v_i.iter().map(|v| 1.0 - v).collect();
                 blended = self.direct.sum.sum(i, o, v_i, &blocked);
             }

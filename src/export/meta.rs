@@ -39,7 +39,7 @@ impl ExportMeta {
         let tile = &loaded.scene.tile;
         let stated = outcome.errors().map(|errors| {
             format!(
-                "estimated error of f (relative L2, PSNR), without that of the table: {}",
+                "stated error of f (relative L2, PSNR), without that of the table: {}",
                 errors.estimate().describe()
             )
         });

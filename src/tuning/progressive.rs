@@ -33,8 +33,8 @@ pub struct ReferenceErrors {
 }
 
 impl ReferenceErrors {
-    /// Errors that a result states without a reference, or none if it states none. The error bars span half and one and a
-    /// half times the estimate.
+    /// Errors that a result states without a reference, or none if it states none. The standard error is half of the stated
+    /// error.
     pub fn stated(outcome: &Outcome) -> Self {
         let estimate = outcome.errors().map(ErrorEstimator::estimate).unwrap_or_default();
         Self {

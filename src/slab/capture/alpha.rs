@@ -40,7 +40,7 @@ const ALPHA_TOLERANCE: f64 = 0.01;
 /// integral.
 const SHIFT: f64 = 0.005;
 /// Squared error at held-out samples of the free distribution over that of the symmetric one below which it is taken. A free
-/// distribution also follows the errors of α and of the solution, and then is worse at other views.
+/// distribution may also fit what an inexact α leaves, and then is worse at other views.
 const FREE_IS_BETTER: f64 = 0.4;
 /// Part of the span outside which a distribution must not grow, and the largest growth of its mass there.
 const OUTER: f64 = 0.8;
@@ -48,7 +48,7 @@ const MAX_GROWTH: f64 = 0.01;
 
 /// Fits the model of one point. For each α, the distribution is solved anew. One camera takes the α that makes the product
 /// of Eqs. 15 and 18 least while the distribution is point symmetric, and then frees the distribution if that predicts
-/// held-out samples better: noise alone also makes a distribution skewed. Eq. 18 alone, with the distribution kept while α
+/// held-out samples much better: noise alone also makes a distribution skewed. Eq. 18 alone, with the distribution kept while α
 /// moves as in the paper, hardly moves where the distribution is narrow in the plane of incidence.
 ///
 /// Several cameras take the α of the least Eq. 15 without any symmetry, because one camera cannot tell α from skewness.
@@ -76,7 +76,7 @@ fn fit_lobe(views: &[View], settings: &FitSettings) -> Option<Fitted> {
     (scale > 0.0 && residual.is_finite()).then_some(Fitted { model, scale, residual, floor: 0.0 })
 }
 
-/// The second pass of one camera: the free distribution if it predicts held-out samples better than the symmetric one, and
+/// The second pass of one camera: the free distribution if it predicts held-out samples much better than the symmetric one, and
 /// if it does not grow at the rim, where few dots hold it.
 fn second_pass(fit: &PointFit, alpha: f64, smooth: f64) -> Option<Vec<f64>> {
     let symmetric = fit.solve(alpha, smooth, Symmetry::Exact, |_| true)?;
