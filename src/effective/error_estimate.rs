@@ -41,6 +41,8 @@ const BLENDED_RATIO: f64 = 1.5;
 /// ratio, none of the tiles of `cargo bench --bench measure -- errors` states less than a third of its true error or exceeds
 /// its bound without a warning.
 pub(crate) const SAFETY_FACTOR: f64 = 1.3;
+/// Median of stated over true errors of the same tiles.
+const TYPICAL_RATIO: f64 = 1.1;
 /// The variance of a sum over systematic samples falls with the number of facets to this power: 1 for random samples, 2
 /// for smooth integrands.
 pub(crate) const FACETS_POWER: f64 = 1.5;
@@ -102,9 +104,9 @@ impl ErrorEstimate {
         if percent < 0.1 { format!("{percent:.3} %{psnr}") } else { format!("{percent:.1} %{psnr}") }
     }
 
-    /// The relative L2 without [`SAFETY_FACTOR`].
-    pub fn expected_rel_l2(&self) -> f64 {
-        self.rel_l2 / SAFETY_FACTOR
+    /// The relative L2 that the true error typically has.
+    pub fn typical_rel_l2(&self) -> f64 {
+        self.rel_l2 / TYPICAL_RATIO
     }
 
     /// Returns true if the stated error exceeds a bound.

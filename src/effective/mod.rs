@@ -20,10 +20,8 @@ pub(crate) use direct::facet_groups::FacetGroup;
 pub use direct::facet_sum::FacetSum;
 pub use direct::forced::mean_colors;
 pub use effective_brdf::{EffectiveBrdf, Representation};
-#[cfg(test)]
-pub(crate) use error_estimate::SAFETY_FACTOR;
 pub use error_estimate::{ErrorBound, ErrorEstimate, ErrorEstimator};
-pub(crate) use error_estimate::{FACETS_POWER, SECOND_SAMPLE_DIVISOR};
+pub(crate) use error_estimate::{FACETS_POWER, SAFETY_FACTOR, SECOND_SAMPLE_DIVISOR};
 pub use gpu_tile::{GpuTileInput, GpuVisibilityInput, HeightMarchInput, ShadowMapInput, SliceInput};
 pub use low_rank::bvndf::VisibilityRows;
 pub use low_rank::rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};

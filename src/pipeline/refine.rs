@@ -17,7 +17,8 @@ use crate::scene::LoadedScene;
 use crate::visibility::Visibility;
 
 /// A quick estimate below this part of the bound ends the search. It examines few pairs, so that the highest of them
-/// may be missing, and so may pairs of nearly equal directions. Light from a rare part of the surface reaches few pairs, so that no quick estimate is made.
+/// may be missing, and so may pairs of nearly equal directions. Light from a rare part of the surface reaches few pairs, so
+/// that no quick estimate is made.
 const QUICK_PART: f64 = 0.65;
 
 /// A direct sum with the results that it was computed from.

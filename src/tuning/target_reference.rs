@@ -4,6 +4,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::base::{Cancel, Result};
+use crate::effective::SAFETY_FACTOR;
 use crate::metrics::{Pair, compare, mirror_biased_pairs, upper_errors};
 use crate::pipeline::{Outcome, Pipeline};
 use crate::reference::ReferenceSettings;
@@ -23,7 +24,7 @@ const REFERENCE_LEAD_DB: f64 = 4.0;
 /// Largest factor between the stated errors of all pairs and of the pairs of the reference that is applied to a measured
 /// error.
 const MAX_CORRECTION: f64 = 8.0;
-/// Standard error of the expected PSNR [dB]. The RMS of stated over true errors is 3.5 dB (`cargo bench --bench measure --
+/// Standard error of the PSNR of a typical error [dB]. The RMS of stated over true errors is 3.5 dB (`cargo bench --bench measure --
 /// errors`), and is taken larger for the few facets from which the search starts.
 const STATED_STD_ERROR_DB: f64 = 5.8;
 /// Smallest standard error of a PSNR from the pairs of the reference [dB] (`cargo bench --bench measure -- choosing`).
@@ -111,7 +112,7 @@ impl TargetReference {
         let Some(estimator) = outcome.errors() else { return 1.0 };
         let squares = |values: &[Vec3]| values.iter().map(|value| value.as_dvec3().length_squared()).sum::<f64>();
         let here = (squares(&estimator.standard_errors(&self.pairs)) / squares(&self.f_bar)).sqrt();
-        let ratio = estimator.estimate().expected_rel_l2() / here;
+        let ratio = estimator.estimate().rel_l2 / SAFETY_FACTOR / here;
         if ratio.is_finite() { ratio.clamp(1.0 / MAX_CORRECTION, MAX_CORRECTION) } else { 1.0 }
     }
 }
@@ -143,9 +144,9 @@ impl Peak {
         Self(if power > 0.0 { 20.0 * (peaks / power.sqrt()).log10() } else { 0.0 })
     }
 
-    /// The PSNR that a result expects, without the safety factor of stated errors [dB]; infinite if it states no error.
+    /// The PSNR of the typical error for what a result states [dB]; infinite if it states no error.
     pub fn stated_db(self, outcome: &Outcome) -> f64 {
-        let stated = outcome.errors().map_or(0.0, |errors| errors.estimate().expected_rel_l2());
+        let stated = outcome.errors().map_or(0.0, |errors| errors.estimate().typical_rel_l2());
         if stated > 0.0 { self.psnr_db(stated) } else { f64::INFINITY }
     }
 

@@ -20,11 +20,12 @@ fn lobes_at_new_views_come_back_within_3_3_and_5_per_cent_at_noise_0_1_and_5_per
         ["0.2", "0.1 x 0.3", "0.3 x 0.1", "GGX"].into_iter().zip(points)
     };
     for (shape, known) in [0.0, 0.25, 0.5, 0.75, 1.0].into_iter().flat_map(of_shapes) {
-        for (noise, bound) in [(0.0, 0.03), (0.01, 0.03), (0.05, 0.05)] {
+        let (without_noise, of_scale) = if shape == "0.2" { (0.02, 0.06) } else { (0.03, 0.08) };
+        for (noise, bound) in [(0.0, without_noise), (0.01, 0.03), (0.05, 0.05)] {
             let found = known.recovered(&[45.0], noise).unwrap();
             let (alpha, scale) = (known.alpha, found.fitted.scale);
             assert!(found.error < bound, "{shape}, {alpha}, noise {noise}: {}", found.error);
-            assert!((scale - 1.0).abs() < 0.08, "{shape}, {alpha}, noise {noise}: {scale}");
+            assert!((scale - 1.0).abs() < of_scale, "{shape}, {alpha}, noise {noise}: {scale}");
         }
     }
 }
