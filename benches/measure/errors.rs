@@ -106,19 +106,21 @@ fn resolved<'a>(rows: &'a [Row]) -> impl Iterator<Item = (&'a Row, usize, &'a Me
 
 /// A sentence on the ratio of stated and true errors.
 fn calibration(rows: &[Row]) -> String {
-    let ratios: Vec<f64> = resolved(rows).map(|(.., run)| run.stated / run.errors.rel_l2).collect();
+    let mut ratios: Vec<f64> = resolved(rows).map(|(.., run)| run.stated / run.errors.rel_l2).collect();
+    ratios.sort_by(f64::total_cmp);
     let decibels: Vec<f64> = ratios.iter().filter(|ratio| **ratio > 0.0).map(|ratio| 20.0 * ratio.log10()).collect();
     let share = |is_counted: &dyn Fn(f64) -> bool| {
         100.0 * ratios.iter().filter(|ratio| is_counted(**ratio)).count() as f64 / ratios.len().max(1) as f64
     };
     format!(
-        "Stated over true error of {} resolved runs: {:.0} % between 0.5 and 2, {:.0} % below 0.5, {:.0} % above 2; smallest {:.2}, largest {:.1}; RMS without zeros {:.1} dB.",
+        "Stated over true error of {} resolved runs: {:.0} % between 0.5 and 2, {:.0} % below 0.5, {:.0} % above 2; smallest {:.2}, median {:.2}, largest {:.1}; RMS without zeros {:.1} dB.",
         ratios.len(),
         share(&|ratio| (0.5..=2.0).contains(&ratio)),
         share(&|ratio| ratio < 0.5),
         share(&|ratio| ratio > 2.0),
-        ratios.iter().copied().fold(f64::INFINITY, f64::min),
-        ratios.iter().copied().fold(0.0, f64::max),
+        ratios.first().copied().unwrap_or_default(),
+        ratios.get(ratios.len() / 2).copied().unwrap_or_default(),
+        ratios.last().copied().unwrap_or_default(),
         (decibels.iter().map(|db| db * db).sum::<f64>() / decibels.len().max(1) as f64).sqrt(),
     )
 }
