@@ -38,9 +38,6 @@ const MIN_SAMPLED_FACETS: usize = 1600;
 const COARSE_SUBSET_DIVISOR: usize = 4;
 const COARSE_TABLE_NODES: Range<usize> = 10_000..20_000;
 
-/// The factor by which fewer facets may raise the error of a table.
-const MAX_ERROR_GROWTH: f64 = 1.25;
-
 /// Tables of more nodes are first computed only where the pairs of the check read them, at about 10,000 nodes.
 const MIN_TRIAL_NODES: usize = 60_000;
 
@@ -228,8 +225,8 @@ impl Shading {
         self.exact.with_direct_representation(Representation::Table(table.read(self.interpolation)))
     }
 
-    /// A table on one grid. A large one is computed only if a trial of some of its nodes is close enough, and from
-    /// fewer facets if that is no worse.
+    /// A table on one grid. A large one is computed only if a trial of some of its nodes is close enough, and from as few
+    /// facets as are close enough.
     fn attempt(
         &self,
         grid: HemispherePairGrid,
@@ -260,10 +257,7 @@ impl Shading {
                 .into_iter()
                 .filter(|part| facets > 0 && (*part <= 5 || facets >= MIN_SAMPLED_FACETS * part))
             {
-                let sampled = trial(Some(facets / part))?;
-                let is_as_good =
-                    |errors: Errors| self.is_close(errors) && errors.rel_l2 < MAX_ERROR_GROWTH * best.rel_l2;
-                if sampled.is_some_and(is_as_good) {
+                if trial(Some(facets / part))?.is_some_and(|errors| self.is_close(errors)) {
                     nodes.facets = Some(facets / part);
                     break;
                 }
