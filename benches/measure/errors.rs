@@ -8,7 +8,7 @@ use biscale::reference::ReferenceSettings;
 use biscale::report::svg::{Chart, LogAxis};
 use biscale::scene::{self, LoadedScene};
 
-use crate::hard_tiles::{Measured, PAIRS_SEED, RayCast, TrueValues, all, measure};
+use crate::hard_tiles::{HardTile, Measured, PAIRS_SEED, RayCast, TrueValues, Truth, all, measure};
 use crate::reference::reference;
 
 const PRESETS: [&str; 2] = ["draft", "standard"];
@@ -24,10 +24,10 @@ const MIN_ERROR: f64 = 1e-5;
 /// The plot of stated against true errors.
 const PLOT: &str = "docs/measurements/errors.svg";
 
-/// The errors of one tile: three seeds at each preset.
+/// The errors of one tile: three seeds at each of [`PRESETS`], or at one preset.
 struct Row {
     name: String,
-    presets: [Vec<Measured>; 2],
+    presets: Vec<Vec<Measured>>,
     std_error: f64,
 }
 
@@ -37,29 +37,15 @@ struct Row {
 /// A temporary folder cannot be created, a scene cannot be opened, or the plot cannot be written.
 pub fn errors(part: Option<&str>, print: &mut dyn FnMut(String)) -> Result<(), String> {
     let is_wanted = |name: &str| part.is_none_or(|part| name.contains(part));
-    let mut rows = Vec::new();
-    let header = |what: &str| {
-        format!(
-            "| {what} | `draft`: true | stated | PSNR | `standard`: true | stated | PSNR | true values |\n|---|---|---|---|---|---|---|---|"
-        )
-    };
-    print(header("tile"));
-    for tile in all().iter().filter(|tile| is_wanted(tile.name)) {
-        let folder = tempfile::tempdir().map_err(|error| format!("temporary folder: {error}"))?;
-        let loaded = tile.open(folder.path(), "standard", 1);
-        let (pairs, truth) = tile.pairs_and_values(&loaded, PAIRS, &RAYS);
-        let of = |preset| SEEDS.map(|seed| measure(&loaded, preset, seed, &pairs, &truth)).collect::<Vec<_>>();
-        rows.push(Row { name: tile.name.to_owned(), presets: PRESETS.map(of), std_error: truth.std_error });
-        print(rows[rows.len() - 1].text());
-    }
-    print(format!("\n{}", header("shipped scene")));
+    let mut rows = hard_tiles(&PRESETS, |tile| is_wanted(tile.name), print)?;
+    print(format!("\n{}", header("shipped scene", &PRESETS)));
     for name in shipped().into_iter().filter(|name| is_wanted(name)) {
         let loaded = scene::open(name, &["quality.backend=cpu".to_owned()]).map_err(|error| error.to_string())?;
         let pairs = mirror_biased_pairs(PAIRS, PAIRS_SEED);
         let truths = true_values(&loaded, &pairs).map_err(|error| error.to_string())?;
         let of = |k: usize| SEEDS.map(|seed| measure(&loaded, PRESETS[k], seed, &pairs, &truths[k])).collect();
         let std_error = truths[1].std_error;
-        rows.push(Row { name: name.to_owned(), presets: [of(0), of(1)], std_error });
+        rows.push(Row { name: name.to_owned(), presets: vec![of(0), of(1)], std_error });
         print(rows[rows.len() - 1].text());
     }
     print(format!("\n{}", calibration(&rows)));
@@ -68,6 +54,44 @@ pub fn errors(part: Option<&str>, print: &mut dyn FnMut(String)) -> Result<(), S
         std::fs::write(&path, plot(&rows)).map_err(|error| format!("{}: {error}", path.display()))?;
     }
     Ok(())
+}
+
+/// Prints the errors of the hard tiles at `fine`, or of those whose name contains `part`. Level tiles are left out: they
+/// are exact.
+///
+/// # Errors
+/// A temporary folder cannot be created.
+pub fn at_fine(part: Option<&str>, print: &mut dyn FnMut(String)) -> Result<(), String> {
+    let is_level = |tile: &HardTile| matches!(tile.truth, Truth::Level(_));
+    let is_wanted = |tile: &HardTile| !is_level(tile) && part.is_none_or(|part| tile.name.contains(part));
+    let rows = hard_tiles(&["fine"], is_wanted, print)?;
+    print(format!("\n{}", calibration(&rows)));
+    Ok(())
+}
+
+/// Prints a table of hard tiles and returns its rows.
+fn hard_tiles(
+    presets: &[&str],
+    is_wanted: impl Fn(&HardTile) -> bool,
+    print: &mut dyn FnMut(String),
+) -> Result<Vec<Row>, String> {
+    print(header("tile", presets));
+    let mut rows = Vec::new();
+    for tile in all().iter().filter(|tile| is_wanted(tile)) {
+        let folder = tempfile::tempdir().map_err(|error| format!("temporary folder: {error}"))?;
+        let loaded = tile.open(folder.path(), "standard", 1);
+        let (pairs, truth) = tile.pairs_and_values(&loaded, PAIRS, &RAYS);
+        let of = |preset: &&str| SEEDS.map(|seed| measure(&loaded, preset, seed, &pairs, &truth)).collect();
+        let presets = presets.iter().map(of).collect();
+        rows.push(Row { name: tile.name.to_owned(), presets, std_error: truth.std_error });
+        print(rows[rows.len() - 1].text());
+    }
+    Ok(rows)
+}
+
+fn header(what: &str, presets: &[&str]) -> String {
+    let columns: String = presets.iter().map(|preset| format!(" `{preset}`: true | stated | PSNR |")).collect();
+    format!("| {what} |{columns} true values |\n|{}", "---|".repeat(2 + 3 * presets.len()))
 }
 
 /// The reference with the light that each preset simulates: a coarser one may leave interreflection out.
@@ -98,8 +122,7 @@ fn shipped() -> Vec<&'static str> {
 /// The runs whose true error is resolved, with the preset.
 fn resolved<'a>(rows: &'a [Row]) -> impl Iterator<Item = (&'a Row, usize, &'a Measured)> {
     let runs = |row: &'a Row| {
-        let of = move |k: usize| row.presets[k].iter().map(move |run| (row, k, run));
-        (0..PRESETS.len()).flat_map(of)
+        row.presets.iter().enumerate().flat_map(move |(k, runs)| runs.iter().map(move |run| (row, k, run)))
     };
     rows.iter().flat_map(runs).filter(|(.., run)| run.is_resolved && run.errors.rel_l2 > MIN_ERROR)
 }

@@ -71,6 +71,7 @@ const MEASUREMENTS: &[(&str, &str, Source)] = &[
     ("color-map-speed", "milliseconds of the colours of an image of 1920 x 1080 pixels", in_lib("the_table_of_speeds")),
     ("color-zoom", "errors of images under colour maps at every distance: minutes", in_lib("the_table_of_zooms")),
     ("errors", "true and stated errors of the presets on hard tiles: many minutes", Source::Here(errors)),
+    ("errors-fine", "true and stated errors of hard tiles at `fine`: many minutes", Source::Here(errors_fine)),
     ("factored", "true and stated errors of low-rank factors that a scene asks for: minutes", Source::Here(factored)),
     ("few-facets", "errors of sums over 700 facets with few distinct normals", Source::Here(few_facets)),
     ("gpu-table", "time of a shading table on the CPU and on the GPU", in_lib("the_table_of_a_height_field_is_timed")),
@@ -137,6 +138,14 @@ fn errors(part: Option<&str>, table: &mut Table) -> Result<(), String> {
         // The page holds all tiles.
         Some(_) => errors::errors(part, &mut |line| println!("{line}")),
         None => errors::errors(None, &mut |line| table.line(line)),
+    }
+}
+
+fn errors_fine(part: Option<&str>, table: &mut Table) -> Result<(), String> {
+    match part {
+        // The page holds all tiles.
+        Some(_) => errors::at_fine(part, &mut |line| println!("{line}")),
+        None => errors::at_fine(None, &mut |line| table.line(line)),
     }
 }
 
