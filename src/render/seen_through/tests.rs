@@ -98,7 +98,7 @@ fn an_edit_of_the_background_makes_only_what_lies_behind_again_and_one_of_the_ca
 }
 
 #[test]
-fn white_surroundings_without_absorption_are_white_through_a_slab_within_2_per_cent() {
+fn white_surroundings_without_absorption_are_white_through_a_slab_in_each_pixel() {
     let folder = tempfile::tempdir().unwrap();
     exr::prelude::write_rgb_file(folder.path().join("white.exr"), 32, 16, |_, _| (1f32, 1f32, 1f32)).unwrap();
     for (name, faces) in FACES {
@@ -110,16 +110,8 @@ fn white_surroundings_without_absorption_are_white_through_a_slab_within_2_per_c
             for paths in [0, 64] {
                 let image = rendered(&loaded, paths, [48, 48]);
                 let worst = image.pixels.iter().map(|p| (*p - 1.0).abs().max_element()).fold(0.0, f32::max);
-                let mean = image.pixels.iter().map(|p| p.x).sum::<f32>() / 2304.0;
-                let beyond = image.pixels.iter().filter(|p| (**p - 1.0).abs().max_element() > 0.02).count() as f32;
-                println!("{name}, {paths} paths: mean {mean}, worst {worst}, beyond 2 %: {:.2} %", beyond / 23.04);
-                assert!((mean - 1.0).abs() < 0.005, "{name}, {paths} paths: {mean}");
-                let squares: f32 = image.pixels.iter().map(|p| (p.x - 1.0).powi(2)).sum();
-                let rms = (squares / 2304.0).sqrt();
-                assert!(rms < 0.03, "{name}, {paths} paths: RMS {rms}, the worst pixel {worst}");
-                // 64 paths are noisy at the rim of the sphere, most of all those of GGX.
-                let bound = if paths == 0 { 0.0 } else { 0.15 };
-                assert!(beyond <= bound * 2304.0, "{name}, {paths} paths: {beyond} pixels of 2304 are off by over 2 %");
+                println!("{name}, {paths} paths: the worst pixel is off by {worst}");
+                assert!(worst < 1e-4, "{name}, {paths} paths: {worst}");
             }
         }
     }

@@ -102,6 +102,31 @@ pub(super) fn mixed(seed: u64, step: u64) -> u64 {
     x ^ (x >> 31)
 }
 
+/// What became of light that entered the slab, or that the top reflected.
+#[derive(Default)]
+struct Tally {
+    /// Light that masking takes, less what is absorbed.
+    masked: f32,
+    /// All light, as if nothing were absorbed. It differs from the light that set out by the noise of the facets' areas.
+    all: f32,
+    ends: Vec<PathEnd>,
+}
+
+impl Tally {
+    /// Adds masked light, of which a part is not absorbed.
+    fn mask(&mut self, weight: f32, part: f32) {
+        self.masked += weight * part;
+        self.all += weight;
+    }
+
+    /// Reports the ends with weights for which all light adds up to what set out; returns the masked part.
+    fn report(self, set_out: f32, end: &mut impl FnMut(PathEnd)) -> f32 {
+        let scale = if self.all > 0.0 { set_out / self.all } else { 1.0 };
+        self.ends.into_iter().for_each(|found| end(PathEnd { weight: scale * found.weight, ..found }));
+        scale * self.masked
+    }
+}
+
 impl Faces {
     /// Reports the ends of all paths of a viewer; returns the parts of the even light below and above.
     pub fn follow(&self, viewer: &Viewer, mut end: impl FnMut(PathEnd)) -> [Vec3; 2] {
@@ -109,48 +134,44 @@ impl Faces {
         let scale = (Vec3::ONE - self.diffuse) / viewer.paths.max(1) as f32;
         if let Some(start) = Some(viewer).filter(|viewer| viewer.o.z > 0.0).and_then(|viewer| Start::new(viewer, self))
         {
+            let mut scaled = |found: PathEnd| end(PathEnd { weight: scale * found.weight, ..found });
             for group in &self.groups {
-                let mut scaled = |mut found: PathEnd| {
-                    found.weight *= scale;
-                    end(found);
-                };
-                let mut lost = 0.0;
+                let (mut inside, mut above) = (Tally::default(), Tally::default());
+                let mut entered = 0.0;
                 // The sum of all weights decides, so that their total is kept but for one step.
                 let mut bounced = (start.seed >> 40) as f32 / (1 << 24) as f32 * BOUNCED_STEP;
                 for first in (0..viewer.paths).step_by(LANES) {
-                    let (masked, crossing) = self.through_both(group, &start, first, &mut scaled);
-                    lost += masked;
+                    let crossing = self.through_both(group, &start, first, &mut inside);
+                    entered += crossing.entered;
                     if self.bounces {
-                        lost += self.bounced(group, &start, &crossing, &mut bounced, &mut scaled);
+                        self.bounced(group, &start, &crossing, &mut bounced, &mut inside);
+                    } else {
+                        inside.all += crossing.reflected.iter().sum::<f32>();
                     }
                 }
                 for path in (0..viewer.paths).step_by(start.every) {
-                    lost += self.reflected(group, &start, path, &mut scaled);
+                    self.reflected(group, &start, path, &mut above);
                 }
-                masked += group.mask * lost;
+                let turned_back = (viewer.paths as f32 - entered).max(0.0);
+                masked += group.mask * (inside.report(entered, &mut scaled) + above.report(turned_back, &mut scaled));
             }
         }
         let half = if self.bounces { 0.5 * masked * scale } else { Vec3::ZERO };
         [half + self.diffuse, half]
     }
 
-    /// Follows the light of a lane of paths that is refracted at both faces; returns the masked part.
-    fn through_both(
-        &self,
-        group: &ChannelGroup,
-        start: &Start,
-        first: usize,
-        end: &mut impl FnMut(PathEnd),
-    ) -> (f32, Crossing) {
+    /// Follows the light of a lane of paths that is refracted at both faces.
+    fn through_both(&self, group: &ChannelGroup, start: &Start, first: usize, tally: &mut Tally) -> Crossing {
         let count = (start.paths - first).min(LANES);
         let (mut inner, mut out, mut areas) = (RayLane::EMPTY, RayLane::EMPTY, [1.0; LANES]);
         let [top_x, top_y] = self.top.lane(start.top + first);
         enter_lane(top_x, top_y, start.ray.d.to_array(), 1.0 / start.facing, group.eta, &mut inner);
         inner.weight[count..].fill(0.0);
         inner.lost[count..].fill(0.0);
+        let entered = inner.weight.iter().sum::<f32>() + inner.lost.iter().sum::<f32>();
         self.top.facing_of(&inner, &mut areas);
         mask_lane(&areas, &mut inner);
-        let mut masked: f32 = inner.lost.iter().sum();
+        tally.mask(inner.lost.iter().sum(), 1.0);
         let [mut slope_x, mut slope_y] = self.bottom.lane(start.below(first)).map(|column| *column);
         self.bottom.facing_of(&inner, &mut areas);
         for l in (0..count).filter(|l| inner.z[*l] > -STEEP) {
@@ -169,28 +190,21 @@ impl Faces {
         mask_lane(&areas, &mut out);
         for l in 0..count {
             let part = self.arriving(group, inner.z[l]);
-            masked += out.lost[l] * grey(group, part);
+            tally.mask(out.lost[l], grey(group, part));
+            tally.all += out.weight[l];
             let is_straight = [top_x[l], top_y[l], slope_x[l], slope_y[l]] == [0.0; 4];
             if out.weight[l] > 0.0 && !is_straight {
                 let direction = Vec3::new(out.x[l], out.y[l], out.z[l]);
-                end(PathEnd { kind: PathKind::Transmitted, direction, weight: part * out.weight[l] });
+                tally.ends.push(PathEnd { kind: PathKind::Transmitted, direction, weight: part * out.weight[l] });
             }
         }
-        (masked, Crossing { first, count, inner, slopes: [slope_x, slope_y], reflected })
+        Crossing { first, count, entered, inner, slopes: [slope_x, slope_y], reflected }
     }
 
     /// Follows some of the light that the bottom reflects when it first arrives, in steps of one weight; `sum` is the light
-    /// since the last step. Returns the masked part.
-    fn bounced(
-        &self,
-        group: &ChannelGroup,
-        start: &Start,
-        crossing: &Crossing,
-        sum: &mut f32,
-        end: &mut impl FnMut(PathEnd),
-    ) -> f32 {
-        let Crossing { first, count, inner, slopes: [slope_x, slope_y], reflected } = crossing;
-        let mut masked = 0.0;
+    /// since the last step.
+    fn bounced(&self, group: &ChannelGroup, start: &Start, crossing: &Crossing, sum: &mut f32, tally: &mut Tally) {
+        let Crossing { first, count, inner, slopes: [slope_x, slope_y], reflected, .. } = crossing;
         for l in 0..*count {
             *sum += reflected[l];
             if *sum < BOUNCED_STEP {
@@ -207,25 +221,25 @@ impl Faces {
             let mut lost = 0.0;
             if let Some(ray) = leave(&self.bottom, ray, false, &mut lost) {
                 let is_straight = self.top.slope(start.top + path) == Vec2::ZERO && slope == Vec2::ZERO;
-                masked += self.follow_up(group, Bounced { ray, part, is_straight, seed: start.numbers(path) }, end);
+                self.follow_up(group, Bounced { ray, part, is_straight, seed: start.numbers(path) }, tally);
             }
-            masked += lost * grey(group, part);
+            tally.mask(lost, grey(group, part));
         }
-        masked
     }
 
-    /// Follows the light of a path that the top reflects; returns the masked part.
-    fn reflected(&self, group: &ChannelGroup, start: &Start, path: usize, end: &mut impl FnMut(PathEnd)) -> f32 {
+    /// Follows the light of a path that the top reflects.
+    fn reflected(&self, group: &ChannelGroup, start: &Start, path: usize, tally: &mut Tally) {
         let slope = self.top.slope(start.top + path);
-        let Some(met) = Met::new(start.ray, slope, start.facing, group.eta) else { return 0.0 };
+        let Some(met) = Met::new(start.ray, slope, start.facing, group.eta) else { return };
         let mut lost = 0.0;
-        if let Some(out) = leave(&self.top, met.reflected(start.ray.d), false, &mut lost)
-            && !met.is_level
-        {
-            let weight = group.mask * (out.weight * start.share);
-            end(PathEnd { kind: PathKind::Reflected, direction: out.d, weight });
+        if let Some(out) = leave(&self.top, met.reflected(start.ray.d), false, &mut lost) {
+            tally.all += out.weight;
+            if !met.is_level {
+                let weight = group.mask * out.weight;
+                tally.ends.push(PathEnd { kind: PathKind::Reflected, direction: out.d, weight });
+            }
         }
-        lost * start.share
+        tally.mask(lost, 1.0);
     }
 
     /// The channels of a group, with the part of light along a direction of vertical component `z` that arrives at the other
@@ -234,10 +248,9 @@ impl Faces {
         if self.depth == Vec3::ZERO { group.mask } else { group.mask * (-self.depth / z.abs().max(1e-6)).exp() }
     }
 
-    /// Follows light that the bottom reflected; returns the masked part.
-    fn follow_up(&self, group: &ChannelGroup, bounced: Bounced, end: &mut impl FnMut(PathEnd)) -> f32 {
+    /// Follows light that the bottom reflected.
+    fn follow_up(&self, group: &ChannelGroup, bounced: Bounced, tally: &mut Tally) {
         let Bounced { mut ray, mut part, mut is_straight, seed } = bounced;
-        let mut masked = 0.0;
         for step in 0..MAX_BOUNCES {
             part *= self.arriving(group, ray.d.z);
             if ray.weight * grey(group, part) < LEAST_WEIGHT {
@@ -251,25 +264,31 @@ impl Faces {
             } else {
                 Some((face.slope(numbers as usize), 1.0))
             };
-            let Some((slope, area)) = chosen else { return masked };
-            let Some(met) = Met::new(ray, slope, face.facing(ray.d) * area, 1.0 / group.eta) else { return masked };
+            let Some((slope, area)) = chosen else { return };
+            let Some(met) = Met::new(ray, slope, face.facing(ray.d) * area, 1.0 / group.eta) else { return };
             is_straight &= met.is_level;
             let mut lost = 0.0;
             if met.reflectance < 1.0
                 && let Some(out) = leave(face, met.refracted(ray.d), is_down, &mut lost)
-                && !is_straight
             {
-                end(PathEnd { kind: PathKind::Bounced, direction: out.d, weight: part * out.weight });
+                tally.all += out.weight;
+                if !is_straight {
+                    tally.ends.push(PathEnd {
+                        kind: PathKind::Bounced,
+                        direction: out.d,
+                        weight: part * out.weight,
+                    });
+                }
             }
             let next = leave(face, met.reflected(ray.d), !is_down, &mut lost);
-            masked += lost * grey(group, part);
+            tally.mask(lost, grey(group, part));
             match next {
                 Some(next) => ray = next,
-                None => return masked,
+                None => return,
             }
         }
         // Light between level facets has a closed form, which leaves nothing.
-        if is_straight { masked } else { masked + ray.weight * grey(group, part) }
+        tally.mask(ray.weight, if is_straight { 0.0 } else { grey(group, part) });
     }
 }
 
@@ -297,6 +316,8 @@ fn candidate(face: &FaceSamples, d: Vec3, numbers: u64) -> Option<(Vec2, f32)> {
 struct Crossing {
     first: usize,
     count: usize,
+    /// Light that the top lets in.
+    entered: f32,
     inner: RayLane,
     slopes: [[f32; LANES]; 2],
     reflected: [f32; LANES],
@@ -317,9 +338,8 @@ struct Start {
     /// Mean over the paths of the first facets' areas, projected towards the viewer. Weights over this mean add up to 1
     /// exactly, whatever the number of paths.
     facing: f32,
-    /// Every so many paths, one follows the light that the top reflects, and stands for the others by this factor.
+    /// Every so many paths, one follows the light that the top reflects.
     every: usize,
-    share: f32,
     /// Numbers of the first slopes.
     top: usize,
     bottom: usize,
@@ -339,15 +359,12 @@ impl Start {
             })
             .sum();
         let every = if viewer.o.z < GRAZING { 1 } else { REFLECTED_EVERY };
-        let facing = |path: usize| viewer.o.dot(faces.top.slope(top + path).extend(1.0)).max(0.0);
-        let followed: f32 = (0..viewer.paths).step_by(every).map(facing).sum();
         let facing = all / viewer.paths as f32;
         (facing > 0.0).then(|| Self {
             ray: Ray { d: -viewer.o, weight: 1.0 },
             paths: viewer.paths,
             facing,
             every,
-            share: if followed > 0.0 { all / followed } else { 0.0 },
             top,
             bottom,
             seed: viewer.seed,

@@ -56,14 +56,16 @@ fn lanes_of_paths_are_the_paths_followed_one_by_one() {
             let Source::Faces { faces, .. } = &view.source else { panic!("no faces") };
             let Some(start) = Start::new(&viewer, faces) else { continue };
             for group in &faces.groups {
-                let (mut fast, mut simple) = (Vec::new(), Vec::new());
-                let mut lost = [0.0; 2];
+                let (mut fast, mut simple) = (Tally::default(), Vec::new());
+                let mut masked = 0.0;
                 for first in (0..viewer.paths).step_by(LANES) {
-                    lost[0] += faces.through_both(group, &start, first, &mut |end| fast.push(end)).0;
+                    faces.through_both(group, &start, first, &mut fast);
                 }
                 for path in 0..viewer.paths {
-                    lost[1] += through_both(faces, group, &start, path, &mut |end| simple.push(end));
+                    masked += through_both(faces, group, &start, path, &mut |end| simple.push(end));
                 }
+                let lost = [fast.masked, masked];
+                let fast = fast.ends;
                 let name = format!("{}/{} at {degrees}", top.describe(), bottom.describe());
                 assert_eq!(fast.len(), simple.len(), "{name}");
                 assert!((lost[0] - lost[1]).abs() < 2e-3 * (1.0 + lost[1]), "{name}: {lost:?}");
