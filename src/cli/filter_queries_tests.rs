@@ -3,7 +3,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::*;
 use crate::pipeline::Pipeline;
-use crate::testing::gaussian_tile::{BANDS, layer, loaded};
+use crate::testing::gaussian_tile::{BANDS, layer, loaded, smooth};
 
 /// A file of queries with some bytes replaced, inserted or removed.
 fn mutated(random: &mut ChaCha8Rng, text: &str) -> Vec<u8> {
@@ -57,4 +57,33 @@ fn any_file_of_queries_is_refused_as_input_or_has_finite_colours_between_those_o
     }
     std::fs::remove_file(&path).unwrap();
     assert!(evaluated > 100, "{evaluated}");
+}
+
+#[test]
+fn colours_of_heights_slopes_and_overhangs_are_those_of_rays() {
+    let (height, slope) = ("{ kind = \"height\" }", "{ kind = \"slope\", azimuth_deg = 30 }");
+    let weave = format!(
+        "[tile]\ngeometry = {{ kind = \"weave\" }}\n[quality]\npreset = \"standard\"\n{}",
+        layer(height, BANDS)
+    );
+    let tiles = [
+        ("heights", smooth(96, 8, "standard", &layer(height, BANDS))),
+        ("slopes", smooth(96, 8, "standard", &layer(slope, BANDS))),
+        ("heights of a weave", loaded(&weave)),
+    ];
+    let pairs = crate::metrics::mirror_biased_pairs(40, 9);
+    for (name, loaded) in tiles {
+        let pipeline = Pipeline::new();
+        let filter = pipeline.color_filter(&loaded).unwrap();
+        let truth = true_colors(&pipeline, &loaded, &pairs, 16_384).unwrap();
+        let (mut square, mut worst) = (0.0, 0.0_f64);
+        for (pair, (expected, _)) in pairs.iter().zip(&truth) {
+            let error = filter.pair(pair.i.as_dvec3(), pair.o.as_dvec3()).color - *expected;
+            square += error.length_squared() / 3.0;
+            worst = worst.max(error.abs().max_element());
+        }
+        let rms = (square / pairs.len() as f64).sqrt();
+        println!("{name}: RMS {rms:.4}, worst {worst:.4}");
+        assert!(rms < 0.01 && worst < 0.03, "{name}: RMS {rms}, worst {worst}");
+    }
 }

@@ -134,6 +134,62 @@ fn the_mean_colour_of_jumps_follows_from_the_tails_of_the_values_that_are_seen()
     }
 }
 
+/// Standard normal numbers (Box and Muller 1958).
+fn normal_pair(random: &mut ChaCha8Rng) -> glam::DVec2 {
+    let (u, v): (f64, f64) = (random.random(), random.random());
+    (-2.0 * (1.0 - u).ln()).sqrt() * glam::DVec2::from_angle(std::f64::consts::TAU * v)
+}
+
+#[test]
+fn slopes_of_an_analytic_surface_have_the_mean_colour_of_slopes_drawn_from_its_density() {
+    let surface =
+        "[color_map.surface]\nheight = 0.1\nslope_mean = [0.1, -0.05]\nslope_covariance = [0.12, 0.03, 0.06]\n";
+    let map = layer("{ kind = \"slope\", azimuth_deg = 30 }", BANDS).replacen(
+        "[[color_map.layer]]",
+        &format!("{surface}[[color_map.layer]]"),
+        1,
+    );
+    let filter = Pipeline::new()
+        .color_filter(&loaded(&format!(
+            "[tile]\ngeometry = {{ kind = \"flat\" }}\n[quality]\npreset = \"draft\"\n{map}"
+        )))
+        .unwrap();
+    let along = glam::DVec2::from_angle(30_f64.to_radians());
+    let deviation = (0.12 * along.x * along.x + 2.0 * 0.03 * along.x * along.y + 0.06 * along.y * along.y).sqrt();
+    let (first, across) = (0.12_f64.sqrt(), 0.03 / 0.12_f64.sqrt());
+    let second = (0.06 - across * across).sqrt();
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    // Slopes ∂h/∂x and ∂h/∂y about their mean, and the colour: the driver is the downward slope.
+    let samples: Vec<(glam::DVec2, DVec3)> = (0..400_000)
+        .map(|_| {
+            let z = normal_pair(&mut random);
+            let from_mean = glam::DVec2::new(first * z.x, across * z.x + second * z.y);
+            let color = filter.map.layers[0].mapped.map.color(-from_mean.dot(along) / deviation);
+            (glam::DVec2::new(0.1, -0.05) + from_mean, color)
+        })
+        .collect();
+    let mean = |weight: &dyn Fn(glam::DVec2) -> f64| {
+        let sum = |(color_sum, sum): (DVec3, f64), (slope, color): &(glam::DVec2, DVec3)| {
+            let weight = weight(*slope);
+            (color_sum + weight * *color, sum + weight)
+        };
+        let (color, sum) = samples.iter().fold((DVec3::ZERO, 0.0), sum);
+        color / sum
+    };
+    let facing = |slope: glam::DVec2, d: DVec3| (d.z - slope.dot(d.truncate())).max(0.0);
+    for (theta_i, theta_o) in [(0.0, 0.0), (0.5, 1.0), (1.2, 0.3), (1.3, 1.3)] {
+        let [i, o] = [direction(theta_i, 2.0), direction(theta_o, -0.4)];
+        let seen = mean(&|slope| facing(slope, o));
+        let error = (filter.slopes(0, o).1 - seen).abs().max_element();
+        assert!(error < 5e-3, "seen at {theta_o}: {error}");
+        // Of a matte facet: both cosines times its area.
+        let lit = mean(&|slope| facing(slope, o) * facing(slope, i) / (1.0 + slope.length_squared()).sqrt());
+        let error = (filter.pair(i, o).color - lit).abs().max_element();
+        assert!(error < 5e-3, "lit at {theta_i}, seen at {theta_o}: {error}");
+        assert!((seen - filter.naive()).abs().max_element() > 0.05, "the colour of the mean is another one");
+    }
+}
+
 #[test]
 fn seen_along_the_light_nothing_is_in_shadow() {
     for distribution in ["measured", "smith"] {

@@ -273,11 +273,7 @@ impl Faces {
             {
                 tally.all += out.weight;
                 if !is_straight {
-                    tally.ends.push(PathEnd {
-                        kind: PathKind::Bounced,
-                        direction: out.d,
-                        weight: part * out.weight,
-                    });
+                    tally.ends.push(PathEnd { kind: PathKind::Bounced, direction: out.d, weight: part * out.weight });
                 }
             }
             let next = leave(face, met.reflected(ray.d), !is_down, &mut lost);
