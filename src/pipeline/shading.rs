@@ -33,10 +33,10 @@ const MAX_ERROR_RATIO: f64 = 2.5;
 const SUBSET_DIVISORS: [usize; 4] = [20, 10, 5, 2];
 const MIN_SAMPLED_FACETS: usize = 1600;
 
-/// Tables with a node count in `COARSE_TABLE_NODES` are computed first from a quarter of the facets, without a trial. If the error is
-/// too large, they are computed again from all facets.
-const COARSE_SUBSET_DIVISOR: usize = 4;
-const COARSE_TABLE_NODES: Range<usize> = 10_000..20_000;
+/// Tables with a node count in `COARSE_TABLE_NODES`, those of drafts, are computed first from this number of facets, without a
+/// trial. If the error is too large, they are computed again from all facets.
+const COARSE_FACETS: usize = 256;
+const COARSE_TABLE_NODES: Range<usize> = 4_000..20_000;
 
 /// Tables of more nodes are first computed only where the pairs of the check read them, at about 10,000 nodes.
 const MIN_TRIAL_NODES: usize = 60_000;
@@ -262,8 +262,8 @@ impl Shading {
                     break;
                 }
             }
-        } else if facets > 0 && COARSE_TABLE_NODES.contains(&count) {
-            let part = Nodes { facets: Some(facets / COARSE_SUBSET_DIVISOR), ..nodes };
+        } else if facets >= 2 * COARSE_FACETS && COARSE_TABLE_NODES.contains(&count) {
+            let part = Nodes { facets: Some(COARSE_FACETS), ..nodes };
             let Some(table) = self.tabulate(part, cancel, times)? else { return Ok(Attempt::Impossible) };
             if self.is_close(check.errors(&self.with_table(table.clone()))) {
                 return Ok(Attempt::Table(table));
