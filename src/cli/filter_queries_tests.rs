@@ -76,14 +76,16 @@ fn colours_of_heights_slopes_and_overhangs_are_those_of_rays() {
         let pipeline = Pipeline::new();
         let filter = pipeline.color_filter(&loaded).unwrap();
         let truth = true_colors(&pipeline, &loaded, &pairs, 16_384).unwrap();
-        let (mut square, mut worst) = (0.0, 0.0_f64);
+        let (mut square, mut of_naive, mut worst) = (0.0, 0.0, 0.0_f64);
         for (pair, (expected, _)) in pairs.iter().zip(&truth) {
             let error = filter.pair(pair.i.as_dvec3(), pair.o.as_dvec3()).color - *expected;
             square += error.length_squared() / 3.0;
+            of_naive += (filter.naive() - *expected).length_squared() / 3.0;
             worst = worst.max(error.abs().max_element());
         }
-        let rms = (square / pairs.len() as f64).sqrt();
-        println!("{name}: RMS {rms:.4}, worst {worst:.4}");
+        let [rms, of_naive] = [square, of_naive].map(|sum| (sum / pairs.len() as f64).sqrt());
+        println!("{name}: RMS {rms:.4}, worst {worst:.4}; colour of the mean {of_naive:.4}");
         assert!(rms < 0.01 && worst < 0.03, "{name}: RMS {rms}, worst {worst}");
+        assert!(of_naive > 0.05, "{name}: {of_naive}");
     }
 }

@@ -66,7 +66,7 @@ pub struct Viewer {
 
 /// A surface through which a viewer sees.
 pub trait ViewPaths: Sync {
-    /// Reports the ends of all paths of a viewer. Their mean is the light that is neither straight nor mirrored nor even.
+    /// Reports the ends of all paths of a viewer. Their sum is the light that is neither straight nor mirrored nor even.
     /// Returns the parts of [`ViewLobes::even`].
     fn follow(&self, viewer: &Viewer, end: impl FnMut(PathEnd)) -> [Vec3; 2];
 

@@ -134,7 +134,7 @@ fn the_mean_colour_of_jumps_follows_from_the_tails_of_the_values_that_are_seen()
     }
 }
 
-/// Standard normal numbers (Box and Muller 1958).
+/// Two independent standard normal numbers (Box and Muller 1958).
 fn normal_pair(random: &mut ChaCha8Rng) -> glam::DVec2 {
     let (u, v): (f64, f64) = (random.random(), random.random());
     (-2.0 * (1.0 - u).ln()).sqrt() * glam::DVec2::from_angle(std::f64::consts::TAU * v)
@@ -159,7 +159,7 @@ fn slopes_of_an_analytic_surface_have_the_mean_colour_of_slopes_drawn_from_its_d
     let (first, across) = (0.12_f64.sqrt(), 0.03 / 0.12_f64.sqrt());
     let second = (0.06 - across * across).sqrt();
     let mut random = ChaCha8Rng::seed_from_u64(3);
-    // Slopes ∂h/∂x and ∂h/∂y about their mean, and the colour: the driver is the downward slope.
+    // Each sample is a slope (∂h/∂x, ∂h/∂y) and its colour. The driver is the downward slope less its mean, over its deviation.
     let samples: Vec<(glam::DVec2, DVec3)> = (0..400_000)
         .map(|_| {
             let z = normal_pair(&mut random);
@@ -182,7 +182,7 @@ fn slopes_of_an_analytic_surface_have_the_mean_colour_of_slopes_drawn_from_its_d
         let seen = mean(&|slope| facing(slope, o));
         let error = (filter.slopes(0, o).1 - seen).abs().max_element();
         assert!(error < 5e-3, "seen at {theta_o}: {error}");
-        // Of a matte facet: both cosines times its area.
+        // The weight of a matte facet is its area times both cosines.
         let lit = mean(&|slope| facing(slope, o) * facing(slope, i) / (1.0 + slope.length_squared()).sqrt());
         let error = (filter.pair(i, o).color - lit).abs().max_element();
         assert!(error < 5e-3, "lit at {theta_i}, seen at {theta_o}: {error}");

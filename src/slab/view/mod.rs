@@ -16,6 +16,7 @@ use self::lobe_table::LobeTable;
 use self::sheet::{SheetPoint, SheetView};
 use super::capture::svbtdf::Svbtdf;
 use super::model::Slab;
+use super::ndf::Ndf;
 use crate::effective::{PathEnd, VaryingSurface, ViewLobes, ViewPaths, Viewer};
 
 /// Colour channels that refract alike.
@@ -31,6 +32,8 @@ struct ChannelGroup {
 struct Faces {
     top: FaceSamples,
     bottom: FaceSamples,
+    /// The normals of both faces.
+    normals: [Arc<Ndf>; 2],
     /// Groups whose index is not that of the surroundings.
     groups: Vec<ChannelGroup>,
     /// Absorption times thickness.
@@ -82,6 +85,7 @@ impl SlabView {
         let faces = Faces {
             top: FaceSamples::new(&slab.top, false),
             bottom: FaceSamples::new(&slab.bottom, true),
+            normals: [slab.top.clone(), slab.bottom.clone()],
             groups,
             depth,
             bounces: slab.inner.is_some(),

@@ -11,7 +11,12 @@ use crate::effective::PathKind;
 use crate::slab::{Channel, ChannelSlab, Inner, Ndf, Optics, Profile};
 
 fn slab(top: Ndf, bottom: Ndf, eta: f64, bounces: bool) -> Arc<Slab> {
-    let optics = Optics { eta: DVec3::splat(eta), ..Optics::default() };
+    absorbing(top, bottom, eta, 0.0, bounces)
+}
+
+fn absorbing(top: Ndf, bottom: Ndf, eta: f64, depth: f64, bounces: bool) -> Arc<Slab> {
+    let optics =
+        Optics { eta: DVec3::splat(eta), thickness: 1.0, absorption: DVec3::splat(depth), ..Optics::default() };
     let slab = Slab::new(Arc::new(top), Arc::new(bottom), optics, 64);
     let inner = bounces.then(|| Inner::new(&slab.top, &slab.bottom, &optics, 64, 1, &Default::default()).unwrap());
     Arc::new(match inner {
@@ -44,13 +49,19 @@ fn parts(view: &SlabView, viewer: &Viewer) -> ([f32; 3], Vec3, [Vec3; 2]) {
 #[test]
 fn paths_have_the_parts_and_the_mean_direction_of_photons() {
     let tilted = Ndf::of_facets(&[(DVec2::new(0.2, 0.1), 2.0), (DVec2::ZERO, 1.0), (DVec2::new(-0.1, 0.0), 1.0)], 64);
-    for (top, bottom) in [(ggx(0.3), ggx(0.1)), (Ndf::smooth(), ggx(0.3)), (tilted.unwrap(), ggx(0.2))] {
-        let slab = slab(top, bottom, 1.5, true);
+    let cases = [
+        (ggx(0.3), ggx(0.1), 0.0),
+        (Ndf::smooth(), ggx(0.3), 0.0),
+        (tilted.unwrap(), ggx(0.2), 0.0),
+        (ggx(0.3), ggx(0.2), 0.4),
+    ];
+    for (top, bottom, depth) in cases {
+        let slab = absorbing(top, bottom, 1.5, depth, true);
         let view = SlabView::new(slab.clone());
         for degrees in [0.0, 50.0, 75.0_f32] {
             let viewer = viewer(degrees, 40_000);
             let (found, mean, even) = parts(&view, &viewer);
-            let walk = ChannelSlab { top: &slab.top, bottom: &slab.bottom, channel: Channel { eta: 1.5, depth: 0.0 } };
+            let walk = ChannelSlab { top: &slab.top, bottom: &slab.bottom, channel: Channel { eta: 1.5, depth } };
             let mut rng = ChaCha8Rng::seed_from_u64(3);
             let photons = 100_000;
             let (mut expected, mut expected_mean, mut masked) = ([0.0; 3], DVec3::ZERO, 0.0);
@@ -80,18 +91,40 @@ fn paths_have_the_parts_and_the_mean_direction_of_photons() {
     }
 }
 
+/// A face of which half is level.
+fn half_level() -> Ndf {
+    let tilted = [DVec2::new(0.2, 0.1), DVec2::new(-0.2, 0.0), DVec2::new(0.0, -0.1)];
+    let facets: Vec<_> = tilted.map(|slope| (slope, 1.0)).into_iter().chain([(DVec2::ZERO, 3.0)]).collect();
+    Ndf::of_facets(&facets, 64).unwrap()
+}
+
 #[test]
-fn all_light_is_accounted_for_at_any_roughness_and_angle() {
-    for roughness in [0.01, 0.2, 0.6] {
+fn all_light_is_accounted_for_at_any_roughness_and_angle_and_with_level_facets() {
+    let faces = [(ggx(0.01), ggx(0.01)), (ggx(0.2), ggx(0.2)), (ggx(0.6), ggx(0.6)), (half_level(), half_level())];
+    for (top, bottom) in faces {
         for eta in [1.0, 1.01, 1.5, 3.0] {
-            let view = SlabView::new(slab(ggx(roughness), ggx(roughness), eta, true));
-            for degrees in [0.0, 45.0, 80.0, 89.0] {
-                let viewer = viewer(degrees, 4096);
+            let name = format!("{} over {}, eta {eta}", top.describe(), bottom.describe());
+            let view = SlabView::new(slab(top.clone(), bottom.clone(), eta, true));
+            for (degrees, paths) in [(0.0, 64), (45.0, 64), (0.0, 4096), (45.0, 4096), (80.0, 4096), (89.0, 4096)] {
+                let viewer = viewer(degrees, paths);
                 let (parts, _, even) = parts(&view, &viewer);
                 let straight = view.straight(viewer.o);
                 let sum = parts.iter().sum::<f32>() + even[0].x + even[1].x + straight[0].x + straight[1].x;
-                assert!((sum - 1.0).abs() < 1e-3, "roughness {roughness}, eta {eta}, {degrees}°: {sum}");
+                assert!((sum - 1.0).abs() < 1e-3, "{name}, {degrees}°, {paths} paths: {sum}");
             }
+        }
+    }
+}
+
+#[test]
+fn light_that_passes_at_once_is_the_same_with_and_without_reflections_inside() {
+    for (top, bottom) in [(ggx(0.3), ggx(0.1)), (half_level(), ggx(0.2)), (half_level(), half_level())] {
+        let [with, without] =
+            [true, false].map(|bounces| SlabView::new(slab(top.clone(), bottom.clone(), 1.5, bounces)));
+        for degrees in [0.0, 50.0] {
+            let viewer = viewer(degrees, 4096);
+            let [with, without] = [&with, &without].map(|view| parts(view, &viewer).0[0]);
+            assert!((with - without).abs() < 5e-3, "{degrees}: {with} {without}");
         }
     }
 }

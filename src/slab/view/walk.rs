@@ -7,6 +7,7 @@ use super::face_samples::{FaceSamples, SLOPES};
 use super::{ChannelGroup, Faces};
 use crate::effective::{PathEnd, PathKind, Viewer};
 use crate::math::simd::{LANES, RayLane, enter_lane, facing_sum, leave_lane, mask_lane};
+use crate::slab::{Channel, Straight, straight};
 
 /// Every so many paths, one also follows the light that the top reflects. At grazing views each path does, because the
 /// reflected part then differs from facet to facet.
@@ -23,6 +24,8 @@ const STEEP: f32 = 0.7;
 /// Largest number of reflections inside, and weight below which a path ends.
 const MAX_BOUNCES: usize = 64;
 const LEAST_WEIGHT: f32 = 5e-3;
+/// Part of the light below which nothing but straight light is expected.
+const LEAST_REST: f64 = 1e-6;
 
 /// Fresnel reflectance and the cosine behind the facet, for the cosine `c` before it; `eta` is the index behind over that
 /// before. The cosine is 0 if all light is reflected.
@@ -102,33 +105,50 @@ pub(super) fn mixed(seed: u64, step: u64) -> u64 {
     x ^ (x >> 31)
 }
 
-/// What became of light that entered the slab, or that the top reflected.
+/// The ends of light that entered the slab, or that the top turned back.
 #[derive(Default)]
-struct Tally {
-    /// Light that masking takes, less what is absorbed.
-    masked: f32,
-    /// All light, as if nothing were absorbed. It differs from the light that set out by the noise of the facets' areas.
-    all: f32,
+struct Account {
+    /// Light that masking takes, less the part that is absorbed.
+    masked: f64,
+    /// All light, as if nothing were absorbed. It differs from the light that set out by the noise of the facets' areas
+    /// and of roulette.
+    all: f64,
+    /// The part of `all` that met level facets alone; it is not among the ends.
+    straight: f64,
     ends: Vec<PathEnd>,
 }
 
-impl Tally {
+impl Account {
     /// Adds masked light, of which a part is not absorbed.
     fn mask(&mut self, weight: f32, part: f32) {
-        self.masked += weight * part;
-        self.all += weight;
+        self.masked += f64::from(weight * part);
+        self.all += f64::from(weight);
     }
 
-    /// Reports the ends with weights for which all light adds up to what set out; returns the masked part.
-    fn report(self, set_out: f32, end: &mut impl FnMut(PathEnd)) -> f32 {
-        let scale = if self.all > 0.0 { set_out / self.all } else { 1.0 };
-        self.ends.into_iter().for_each(|found| end(PathEnd { weight: scale * found.weight, ..found }));
-        scale * self.masked
+    /// Adds light that left; `end` is absent if it met level facets alone.
+    fn leave(&mut self, weight: f32, end: Option<PathEnd>) {
+        self.all += f64::from(weight);
+        match end {
+            Some(end) => self.ends.push(end),
+            None => self.straight += f64::from(weight),
+        }
+    }
+
+    /// The factor for which all light adds up to what set out. The bias of such a ratio falls with the number of paths.
+    fn scale(&self, set_out: f64) -> f64 {
+        if self.all > 0.0 { set_out / self.all } else { 1.0 }
+    }
+
+    /// Reports the ends with their weights times a factor; returns the masked part.
+    fn report(self, scale: f64, end: &mut impl FnMut(PathEnd)) -> f32 {
+        self.ends.into_iter().for_each(|found| end(PathEnd { weight: scale as f32 * found.weight, ..found }));
+        (scale * self.masked) as f32
     }
 }
 
 impl Faces {
-    /// Reports the ends of all paths of a viewer; returns the parts of the even light below and above.
+    /// Reports the ends of all paths of a viewer, with weights for which all light adds up to what reaches the top;
+    /// returns the parts of the even light below and above.
     pub fn follow(&self, viewer: &Viewer, mut end: impl FnMut(PathEnd)) -> [Vec3; 2] {
         let mut masked = Vec3::ZERO;
         let scale = (Vec3::ONE - self.diffuse) / viewer.paths.max(1) as f32;
@@ -136,32 +156,62 @@ impl Faces {
         {
             let mut scaled = |found: PathEnd| end(PathEnd { weight: scale * found.weight, ..found });
             for group in &self.groups {
-                let (mut inside, mut above) = (Tally::default(), Tally::default());
-                let mut entered = 0.0;
-                // The sum of all weights decides, so that their total is kept but for one step.
-                let mut bounced = (start.seed >> 40) as f32 / (1 << 24) as f32 * BOUNCED_STEP;
-                for first in (0..viewer.paths).step_by(LANES) {
-                    let crossing = self.through_both(group, &start, first, &mut inside);
-                    entered += crossing.entered;
-                    if self.bounces {
-                        self.bounced(group, &start, &crossing, &mut bounced, &mut inside);
-                    } else {
-                        inside.all += crossing.reflected.iter().sum::<f32>();
-                    }
-                }
-                for path in (0..viewer.paths).step_by(start.every) {
-                    self.reflected(group, &start, path, &mut above);
-                }
-                let turned_back = (viewer.paths as f32 - entered).max(0.0);
-                masked += group.mask * (inside.report(entered, &mut scaled) + above.report(turned_back, &mut scaled));
+                let (inside, entered) = self.inside(group, &start);
+                let above = self.above(group, &start);
+                let paths = viewer.paths as f64;
+                let scales = [inside.scale(entered), above.scale((paths - entered).max(0.0))];
+                // Straight light has a closed form, from which the paths differ by the number of level facets.
+                let rest = paths - scales[0] * inside.straight - scales[1] * above.straight;
+                let exact = paths * (1.0 - self.straight(group, viewer.o));
+                let of_rest = if rest > LEAST_REST * paths { exact / rest } else { 1.0 };
+                let [inside_scale, above_scale] = scales.map(|scale| scale * of_rest);
+                let lost = inside.report(inside_scale, &mut scaled) + above.report(above_scale, &mut scaled);
+                masked += group.mask * lost;
             }
         }
         let half = if self.bounces { 0.5 * masked * scale } else { Vec3::ZERO };
         [half + self.diffuse, half]
     }
 
+    /// Follows the light that enters the slab, and returns how much enters.
+    fn inside(&self, group: &ChannelGroup, start: &Start) -> (Account, f64) {
+        let (mut account, mut entered) = (Account::default(), 0.0);
+        // The sum of all weights decides, so that their total is kept but for one step.
+        let mut bounced = (start.seed >> 40) as f32 / (1 << 24) as f32 * BOUNCED_STEP;
+        for first in (0..start.paths).step_by(LANES) {
+            let crossing = self.through_both(group, start, first, &mut account);
+            entered += f64::from(crossing.entered);
+            if self.bounces {
+                self.bounced(group, start, &crossing, &mut bounced, &mut account);
+            } else {
+                account.mask(crossing.reflected.iter().sum(), 0.0);
+            }
+        }
+        (account, entered)
+    }
+
+    /// Follows the light that the top turns back, of some of the paths.
+    fn above(&self, group: &ChannelGroup, start: &Start) -> Account {
+        let mut account = Account::default();
+        for path in (0..start.paths).step_by(start.every) {
+            self.reflected(group, start, path, &mut account);
+        }
+        account
+    }
+
+    /// The part of light that meets level facets alone, as if nothing were absorbed.
+    fn straight(&self, group: &ChannelGroup, o: Vec3) -> f64 {
+        let [top, bottom] = &self.normals;
+        if top.level() <= 0.0 {
+            return 0.0;
+        }
+        let channel = Channel { eta: group.eta.into(), depth: 0.0 };
+        let Straight { transmitted, reflected } = straight(top, bottom, o.as_dvec3(), channel, self.bounces);
+        transmitted + reflected
+    }
+
     /// Follows the light of a lane of paths that is refracted at both faces.
-    fn through_both(&self, group: &ChannelGroup, start: &Start, first: usize, tally: &mut Tally) -> Crossing {
+    fn through_both(&self, group: &ChannelGroup, start: &Start, first: usize, account: &mut Account) -> Crossing {
         let count = (start.paths - first).min(LANES);
         let (mut inner, mut out, mut areas) = (RayLane::EMPTY, RayLane::EMPTY, [1.0; LANES]);
         let [top_x, top_y] = self.top.lane(start.top + first);
@@ -171,7 +221,7 @@ impl Faces {
         let entered = inner.weight.iter().sum::<f32>() + inner.lost.iter().sum::<f32>();
         self.top.facing_of(&inner, &mut areas);
         mask_lane(&areas, &mut inner);
-        tally.mask(inner.lost.iter().sum(), 1.0);
+        account.mask(inner.lost.iter().sum(), 1.0);
         let [mut slope_x, mut slope_y] = self.bottom.lane(start.below(first)).map(|column| *column);
         self.bottom.facing_of(&inner, &mut areas);
         for l in (0..count).filter(|l| inner.z[*l] > -STEEP) {
@@ -190,12 +240,12 @@ impl Faces {
         mask_lane(&areas, &mut out);
         for l in 0..count {
             let part = self.arriving(group, inner.z[l]);
-            tally.mask(out.lost[l], grey(group, part));
-            tally.all += out.weight[l];
+            account.mask(out.lost[l], grey(group, part));
             let is_straight = [top_x[l], top_y[l], slope_x[l], slope_y[l]] == [0.0; 4];
-            if out.weight[l] > 0.0 && !is_straight {
+            if out.weight[l] > 0.0 {
                 let direction = Vec3::new(out.x[l], out.y[l], out.z[l]);
-                tally.ends.push(PathEnd { kind: PathKind::Transmitted, direction, weight: part * out.weight[l] });
+                let end = PathEnd { kind: PathKind::Transmitted, direction, weight: part * out.weight[l] };
+                account.leave(out.weight[l], (!is_straight).then_some(end));
             }
         }
         Crossing { first, count, entered, inner, slopes: [slope_x, slope_y], reflected }
@@ -203,7 +253,7 @@ impl Faces {
 
     /// Follows some of the light that the bottom reflects when it first arrives, in steps of one weight; `sum` is the light
     /// since the last step.
-    fn bounced(&self, group: &ChannelGroup, start: &Start, crossing: &Crossing, sum: &mut f32, tally: &mut Tally) {
+    fn bounced(&self, group: &ChannelGroup, start: &Start, crossing: &Crossing, sum: &mut f32, account: &mut Account) {
         let Crossing { first, count, inner, slopes: [slope_x, slope_y], reflected, .. } = crossing;
         for l in 0..*count {
             *sum += reflected[l];
@@ -221,25 +271,22 @@ impl Faces {
             let mut lost = 0.0;
             if let Some(ray) = leave(&self.bottom, ray, false, &mut lost) {
                 let is_straight = self.top.slope(start.top + path) == Vec2::ZERO && slope == Vec2::ZERO;
-                self.follow_up(group, Bounced { ray, part, is_straight, seed: start.numbers(path) }, tally);
+                self.follow_up(group, Bounced { ray, part, is_straight, seed: start.numbers(path) }, account);
             }
-            tally.mask(lost, grey(group, part));
+            account.mask(lost, grey(group, part));
         }
     }
 
     /// Follows the light of a path that the top reflects.
-    fn reflected(&self, group: &ChannelGroup, start: &Start, path: usize, tally: &mut Tally) {
+    fn reflected(&self, group: &ChannelGroup, start: &Start, path: usize, account: &mut Account) {
         let slope = self.top.slope(start.top + path);
         let Some(met) = Met::new(start.ray, slope, start.facing, group.eta) else { return };
         let mut lost = 0.0;
         if let Some(out) = leave(&self.top, met.reflected(start.ray.d), false, &mut lost) {
-            tally.all += out.weight;
-            if !met.is_level {
-                let weight = group.mask * out.weight;
-                tally.ends.push(PathEnd { kind: PathKind::Reflected, direction: out.d, weight });
-            }
+            let end = PathEnd { kind: PathKind::Reflected, direction: out.d, weight: group.mask * out.weight };
+            account.leave(out.weight, (!met.is_level).then_some(end));
         }
-        tally.mask(lost, 1.0);
+        account.mask(lost, 1.0);
     }
 
     /// The channels of a group, with the part of light along a direction of vertical component `z` that arrives at the other
@@ -249,7 +296,7 @@ impl Faces {
     }
 
     /// Follows light that the bottom reflected.
-    fn follow_up(&self, group: &ChannelGroup, bounced: Bounced, tally: &mut Tally) {
+    fn follow_up(&self, group: &ChannelGroup, bounced: Bounced, account: &mut Account) {
         let Bounced { mut ray, mut part, mut is_straight, seed } = bounced;
         for step in 0..MAX_BOUNCES {
             part *= self.arriving(group, ray.d.z);
@@ -271,20 +318,21 @@ impl Faces {
             if met.reflectance < 1.0
                 && let Some(out) = leave(face, met.refracted(ray.d), is_down, &mut lost)
             {
-                tally.all += out.weight;
-                if !is_straight {
-                    tally.ends.push(PathEnd { kind: PathKind::Bounced, direction: out.d, weight: part * out.weight });
-                }
+                let end = PathEnd { kind: PathKind::Bounced, direction: out.d, weight: part * out.weight };
+                account.leave(out.weight, (!is_straight).then_some(end));
             }
             let next = leave(face, met.reflected(ray.d), !is_down, &mut lost);
-            tally.mask(lost, grey(group, part));
+            account.mask(lost, grey(group, part));
             match next {
                 Some(next) => ray = next,
                 None => return,
             }
         }
-        // Light between level facets has a closed form, which leaves nothing.
-        tally.mask(ray.weight, if is_straight { 0.0 } else { grey(group, part) });
+        match is_straight {
+            // Light between level facets has a closed form, which leaves nothing.
+            true => account.leave(ray.weight, None),
+            false => account.mask(ray.weight, grey(group, part)),
+        }
     }
 }
 

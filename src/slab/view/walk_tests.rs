@@ -56,7 +56,7 @@ fn lanes_of_paths_are_the_paths_followed_one_by_one() {
             let Source::Faces { faces, .. } = &view.source else { panic!("no faces") };
             let Some(start) = Start::new(&viewer, faces) else { continue };
             for group in &faces.groups {
-                let (mut fast, mut simple) = (Tally::default(), Vec::new());
+                let (mut fast, mut simple) = (Account::default(), Vec::new());
                 let mut masked = 0.0;
                 for first in (0..viewer.paths).step_by(LANES) {
                     faces.through_both(group, &start, first, &mut fast);
@@ -64,7 +64,7 @@ fn lanes_of_paths_are_the_paths_followed_one_by_one() {
                 for path in 0..viewer.paths {
                     masked += through_both(faces, group, &start, path, &mut |end| simple.push(end));
                 }
-                let lost = [fast.masked, masked];
+                let lost = [fast.masked as f32, masked];
                 let fast = fast.ends;
                 let name = format!("{}/{} at {degrees}", top.describe(), bottom.describe());
                 assert_eq!(fast.len(), simple.len(), "{name}");
@@ -74,6 +74,33 @@ fn lanes_of_paths_are_the_paths_followed_one_by_one() {
                         (a.weight - b.weight).length() + b.weight.length() * (a.direction - b.direction).length();
                     assert!(difference < 2e-3 * b.weight.length().max(0.1), "{name}: {a:?} {b:?}");
                 }
+            }
+        }
+    }
+}
+
+#[test]
+fn unscaled_paths_account_for_the_light_that_sets_out_within_5_per_cent() {
+    for (roughness, eta) in [(0.05, 1.5), (0.2, 1.01), (0.2, 1.5), (0.6, 1.5), (0.4, 3.0)] {
+        let face = || Arc::new(Ndf::analytic(Profile::Ggx, DVec2::new(roughness, 0.5 * roughness), 0.3));
+        let optics = Optics { eta: DVec3::splat(eta), ..Optics::default() };
+        let slab = Slab::new(face(), face(), optics, 64);
+        let inner = crate::slab::Inner::new(&slab.top, &slab.bottom, &optics, 64, 1, &Default::default()).unwrap();
+        for slab in [slab.clone(), slab.with_inner(Arc::new(inner))] {
+            let view = SlabView::new(Arc::new(slab));
+            let Source::Faces { faces, .. } = &view.source else { panic!("no faces") };
+            for degrees in [0.0, 45.0, 75.0, 85.0_f32] {
+                let (sin, cos) = degrees.to_radians().sin_cos();
+                let viewer = Viewer { o: Vec3::new(0.6 * sin, 0.8 * sin, cos), paths: 4096, seed: 3 };
+                let start = Start::new(&viewer, faces).unwrap();
+                let (inside, entered) = faces.inside(&faces.groups[0], &start);
+                let above = faces.above(&faces.groups[0], &start);
+                let turned_back = (4096.0 - entered) / start.every as f64;
+                let name = format!("roughness {roughness}, eta {eta}, {degrees}°, bounces {}", faces.bounces);
+                assert!((inside.all / entered - 1.0).abs() < 0.05, "{name}: {} of {entered}", inside.all);
+                // Half a path of 4096, because the difference of two sums is as small near the index 1.
+                let bound = 0.05 * turned_back + 0.5;
+                assert!((above.all - turned_back).abs() < bound, "{name}: {} of {turned_back}", above.all);
             }
         }
     }
