@@ -133,20 +133,24 @@ fn budgets(_: Option<&str>, table: &mut Table) -> Result<(), String> {
     if hits >= 9 { Ok(()) } else { Err(format!("found {hits} of ten: {misses:?}")) }
 }
 
-fn errors(part: Option<&str>, table: &mut Table) -> Result<(), String> {
+/// A measurement of many rows, or of those whose name contains `part`, which the page does not hold.
+fn whole_or_part(
+    part: Option<&str>,
+    table: &mut Table,
+    measure: impl Fn(Option<&str>, &mut dyn FnMut(String)) -> Result<(), String>,
+) -> Result<(), String> {
     match part {
-        // The page holds all tiles.
-        Some(_) => errors::errors(part, &mut |line| println!("{line}")),
-        None => errors::errors(None, &mut |line| table.line(line)),
+        Some(_) => measure(part, &mut |line| println!("{line}")),
+        None => measure(None, &mut |line| table.line(line)),
     }
 }
 
+fn errors(part: Option<&str>, table: &mut Table) -> Result<(), String> {
+    whole_or_part(part, table, errors::errors)
+}
+
 fn errors_fine(part: Option<&str>, table: &mut Table) -> Result<(), String> {
-    match part {
-        // The page holds all tiles.
-        Some(_) => errors::at_fine(part, &mut |line| println!("{line}")),
-        None => errors::at_fine(None, &mut |line| table.line(line)),
-    }
+    whole_or_part(part, table, errors::at_fine)
 }
 
 fn factored(_: Option<&str>, table: &mut Table) -> Result<(), String> {
@@ -158,19 +162,11 @@ fn few_facets(_: Option<&str>, table: &mut Table) -> Result<(), String> {
 }
 
 fn interreflection(part: Option<&str>, table: &mut Table) -> Result<(), String> {
-    match part {
-        // The page holds all cases.
-        Some(_) => interreflection::interreflection(part, &mut |line| println!("{line}")),
-        None => interreflection::interreflection(None, &mut |line| table.line(line)),
-    }
+    whole_or_part(part, table, interreflection::interreflection)
 }
 
 fn bounced_share(part: Option<&str>, table: &mut Table) -> Result<(), String> {
-    match part {
-        // The page holds all scenes.
-        Some(_) => bounced_share::bounced_share(part, &mut |line| println!("{line}")),
-        None => bounced_share::bounced_share(None, &mut |line| table.line(line)),
-    }
+    whole_or_part(part, table, bounced_share::bounced_share)
 }
 
 fn interpolation(_: Option<&str>, table: &mut Table) -> Result<(), String> {

@@ -38,7 +38,7 @@ fn images_read_one_table_of_direct_and_of_bounced_light() {
 }
 
 #[test]
-fn drafts_of_tiles_with_mirror_planes_read_tables_within_their_tolerance() {
+fn drafts_of_a_weave_and_of_rods_read_tables_within_their_tolerance() {
     for geometry in ["{ kind = \"weave\" }", "{ kind = \"rods\" }"] {
         let source = format!(
             "[tile]\ngeometry = {geometry}\n[quality]\npreset = \"draft\"\nbackend = \"cpu\"\nmethod = \"direct\"\n\

@@ -132,7 +132,7 @@ fn grooves_whose_bottom_few_pairs_see_state_their_error() {
     }
 }
 
-/// `cargo bench --bench measure -- errors` measures `draft` and `standard`.
+/// `cargo bench --bench measure -- errors` measures `draft` and `standard`, `errors-fine` three seeds and the sheets with holes.
 #[test]
 #[ignore = "minutes: 25 tiles with up to 131,072 facets"]
 fn hard_tiles_at_fine_are_within_the_bound_or_warn_of_their_error() {
