@@ -12,16 +12,29 @@ use super::{QUICK, editor, harness, quick, settle};
 use crate::app::actions::Action;
 use crate::app::document::Document;
 use crate::app::editor::Editor;
-use crate::app::worker::{DisplayImage, GpuShare, Grade, LOSE_GPU, Screen};
+use crate::app::worker::{DisplayImage, GpuShare, Grade, Screen};
+
+/// Opens a GPU as a window does, with a renderer for the interface.
+fn screen() -> Option<Screen> {
+    let opened = crate::gpu::Gpu::open().map_err(|error| eprintln!("SKIPPED: {error}")).ok()?;
+    let gpu = crate::gpu::Gpu::from_window(opened.adapter, opened.device, opened.queue, || {});
+    let format = wgpu::TextureFormat::Rgba8Unorm;
+    let interface = eframe::egui_wgpu::Renderer::new(&gpu.device, format, Default::default());
+    Some(Screen::new(gpu.into(), Arc::new(RwLock::new(interface))))
+}
+
+fn on_gpu(document: &Document) -> crate::scene::Scene {
+    let mut scene = (**document.scene()).clone();
+    scene.quality.backend = "gpu".to_owned();
+    scene
+}
 
 #[test]
-fn a_lost_gpu_is_reported_and_the_cpu_renders_the_next_images() {
-    if let Err(error) = crate::gpu::Gpu::open() {
-        return eprintln!("SKIPPED: {error}");
-    }
+fn the_loss_of_the_window_s_gpu_is_reported_and_the_cpu_renders_the_next_images() {
+    let Some(screen) = screen() else { return };
     let mut harness = harness(quick());
-    let mut scene = (**editor(&mut harness).document.scene()).clone();
-    scene.quality.backend = "gpu".to_owned();
+    editor(&mut harness).share_gpu(GpuShare { only_software: None, screen: Some(screen.clone()) });
+    let scene = on_gpu(&editor(&mut harness).document);
     editor(&mut harness).document.edit(scene);
     harness.step();
     settle(&mut harness);
@@ -29,7 +42,7 @@ fn a_lost_gpu_is_reported_and_the_cpu_renders_the_next_images() {
     if rendered_on.starts_with("CPU") {
         return eprintln!("SKIPPED: the GPU does not render images ({rendered_on})");
     }
-    LOSE_GPU.store(true, std::sync::atomic::Ordering::SeqCst);
+    screen.gpu.device.destroy();
     let mut scene = (**editor(&mut harness).document.scene()).clone();
     scene.light.rotation_deg = 25.0;
     editor(&mut harness).document.edit(scene.clone());
@@ -47,22 +60,8 @@ fn a_lost_gpu_is_reported_and_the_cpu_renders_the_next_images() {
     assert!(texts.contains("The GPU failed") && texts.contains("document is kept"), "{texts}");
     assert_eq!(**editor.document.scene(), scene);
     let preview = editor.object.preview.as_ref().unwrap();
+    assert!(matches!(preview.image, DisplayImage::Pixels(_)) && preview.rendered_on.starts_with("CPU"));
     assert!(preview.radiance.as_ref().unwrap().pixels.iter().all(|pixel| pixel.is_finite()));
-}
-
-/// Opens a GPU as a window does, with a renderer for the interface.
-fn screen() -> Option<Screen> {
-    let opened = crate::gpu::Gpu::open().map_err(|error| eprintln!("SKIPPED: {error}")).ok()?;
-    let gpu = crate::gpu::Gpu::from_window(opened.adapter, opened.device, opened.queue, || {});
-    let format = wgpu::TextureFormat::Rgba8Unorm;
-    let interface = eframe::egui_wgpu::Renderer::new(&gpu.device, format, Default::default());
-    Some(Screen::new(gpu.into(), Arc::new(RwLock::new(interface))))
-}
-
-fn on_gpu(document: &Document) -> crate::scene::Scene {
-    let mut scene = (**document.scene()).clone();
-    scene.quality.backend = "gpu".to_owned();
-    scene
 }
 
 #[test]
@@ -151,28 +150,6 @@ fn with_a_gpu_the_first_image_after_an_edit_needs_no_visibility_of_the_cpu() {
     settle(&mut harness);
     let preview = editor(&mut harness).object.preview.clone().unwrap();
     assert!(!std::sync::Arc::ptr_eq(&preview.brdf.unwrap(), &draft.brdf.unwrap()));
-}
-
-#[test]
-fn the_cpu_renders_images_after_the_window_s_gpu_is_lost() {
-    let Some(screen) = screen() else { return };
-    let mut harness = harness(quick());
-    editor(&mut harness).share_gpu(GpuShare { only_software: None, screen: Some(screen.clone()) });
-    let scene = on_gpu(&editor(&mut harness).document);
-    editor(&mut harness).document.edit(scene.clone());
-    harness.step();
-    settle(&mut harness);
-    screen.gpu.device.destroy();
-    let scene = crate::scene::Scene { light: crate::scene::Light { count: 3, ..scene.light.clone() }, ..scene };
-    editor(&mut harness).document.edit(scene);
-    harness.step();
-    settle(&mut harness);
-    let preview = editor(&mut harness).object.preview.clone().unwrap();
-    assert!(
-        matches!(preview.image, DisplayImage::Pixels(_)) && preview.rendered_on.starts_with("CPU"),
-        "{}",
-        preview.rendered_on
-    );
 }
 
 #[test]

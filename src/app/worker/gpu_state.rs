@@ -62,10 +62,6 @@ pub struct PreviewInput<'a> {
     pub screen: Option<&'a Screen>,
 }
 
-/// Test switch that destroys the GPU's device for the next image.
-#[cfg(test)]
-pub static LOSE_GPU: std::sync::atomic::AtomicBool = std::sync::atomic::AtomicBool::new(false);
-
 impl GpuState {
     /// Drops the renderer because the object changed.
     pub fn forget_object(&mut self) {
@@ -107,10 +103,6 @@ impl GpuState {
             *self = Self::open(backend == "gpu", input.screen);
         }
         let Self::Open(open) = self else { return Ok(None) };
-        #[cfg(test)]
-        if LOSE_GPU.swap(false, std::sync::atomic::Ordering::SeqCst) {
-            open.gpu.device.destroy();
-        }
         let done = open.set_material(input, cancel).and_then(|table_ms| match (&mut open.renderer, table_ms) {
             (Some((renderer, _)), Some(table_ms)) => work(renderer, &open.gpu).map(|done| Some((done, table_ms))),
             _ => Ok(None),

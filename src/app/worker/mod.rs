@@ -40,8 +40,6 @@ pub use accuracy::{AccuracyChart, AccuracyJob, AccuracyPoint, AccuracyResult, wi
 pub use capture::{CaptureJob, CaptureResult, ShownCapture};
 pub use color_map::{ColorMapJob, ColorMapResult, DriverValues, REACH as HISTOGRAM_REACH};
 pub use export::{ExportJob, ExportKind, ExportResult, TableChoice};
-#[cfg(test)]
-pub use gpu_state::LOSE_GPU;
 pub use lobe::{LobeJob, LobePlot, logarithmic};
 pub use methods::{MethodImage, MethodsJob, MethodsResult};
 pub use rendered_preview::{DisplayImage, Grade, ImageJob, ImageResult, RenderedPreview};
