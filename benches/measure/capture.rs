@@ -122,15 +122,12 @@ fn of_photons(cells: &[f64], bounced: Option<Arc<Bounced>>) -> Option<(Fitted, f
     };
     let dot = |k: u32| DVec2::new(f64::from(k % 40) - 19.5, f64::from(k / 40) - 19.5) * 0.0024 - DVec2::new(0.04, 0.0);
     let lights: Vec<DotLight> = (0..1600).map(|k| DotLight::new(dot(k), 0.04, DVec2::ZERO)).collect();
-    let values: Vec<(f64, f64)> = lights.iter().map(|light| (light.irradiance, read(light.i))).collect();
-    let diffuse = diffuse_part(&values);
-    let sample = |(light, (irradiance, btdf)): (&DotLight, &(f64, f64))| Sample {
-        i: light.i,
-        irradiance: *irradiance,
-        btdf: (btdf - diffuse).max(0.0),
-    };
+    let sample = |light: &DotLight| Sample { i: light.i, irradiance: light.irradiance, btdf: read(light.i) };
+    let mut samples: Vec<Sample> = lights.iter().map(sample).collect();
+    let diffuse = diffuse_part(&[&samples]);
+    samples.iter_mut().for_each(|sample| sample.btdf = (sample.btdf - diffuse).max(0.0));
     let o = DVec3::new(FRAC_1_SQRT_2, 0.0, -FRAC_1_SQRT_2);
-    let view = View { o, samples: lights.iter().zip(&values).map(sample).collect() };
+    let view = View { o, samples };
     let grid = SlopeGrid { side: 32, span: 0.8 };
     let settings = FitSettings { optics: LobeOptics::new(1.5, 0.2), grid, smooth: 1.0, alpha: None, bounced };
     let smooth = choose_smoothness(&[vec![view.clone()]], &settings);

@@ -60,7 +60,7 @@ pub fn fit_point(views: &[View], settings: &FitSettings) -> Option<Fitted> {
 
 /// Fits samples without light that is reflected inside.
 fn fit_lobe(views: &[View], settings: &FitSettings) -> Option<Fitted> {
-    let fit = PointFit::new(views, &settings.optics, settings.grid)?;
+    let fit = linearised(PointFit::new(views, &settings.optics, settings.grid)?, settings)?;
     let alpha = match settings.alpha {
         Some(alpha) => alpha,
         None if views.len() > 1 => least(|alpha| misfit(&fit, alpha, settings.smooth)),
@@ -74,6 +74,22 @@ fn fit_lobe(views: &[View], settings: &FitSettings) -> Option<Fitted> {
     let residual = fit.residual(alpha, &x);
     let (model, scale) = fit.model(alpha, x);
     (scale > 0.0 && residual.is_finite()).then_some(Fitted { model, scale, residual, floor: 0.0 })
+}
+
+/// The given α, or a few from 0 to 1.
+fn tried(settings: &FitSettings) -> Vec<f64> {
+    settings.alpha.map_or_else(|| (0..=STEPS).map(step).collect(), |alpha| vec![alpha])
+}
+
+/// The equations linearised about the solution of the α that fits their logarithms best among a few. For each of these α the
+/// distribution follows the samples, so that a nearby one is as good.
+fn linearised(fit: PointFit, settings: &FitSettings) -> Option<PointFit> {
+    let solution = |alpha: f64| {
+        let x = fit.solve(alpha, settings.smooth, fit.symmetry(), |_| true)?;
+        Some((fit.misfit(alpha, &x, |_| true).0, alpha, x))
+    };
+    let (_, alpha, x) = tried(settings).into_iter().filter_map(solution).min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(fit.linearised(alpha, &x))
 }
 
 /// The second pass of one camera: the free distribution if it predicts held-out samples much better than the symmetric one, and
@@ -126,9 +142,13 @@ fn weighted(fit: &PointFit, value: impl Fn(&Equation) -> (f64, DVec3)) -> Option
     (total > 0.0 && total.is_finite()).then(|| sum / total)
 }
 
+/// An α that is tried first.
+fn step(k: usize) -> f64 {
+    k as f64 / STEPS as f64
+}
+
 /// The place of the least value of a function from 0 to 1: by golden section beside the least of a few steps.
 fn least(value: impl Fn(f64) -> f64) -> f64 {
-    let step = |k: usize| k as f64 / STEPS as f64;
     let values: Vec<f64> = (0..=STEPS).map(|k| value(step(k))).collect();
     let best = values.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1)).map_or(0, |(k, _)| k);
     let (low, high) = (step(best.saturating_sub(1)), step((best + 1).min(STEPS)));
@@ -174,11 +194,10 @@ pub fn choose_smoothness(points: &[Vec<View>], settings: &FitSettings) -> f64 {
     let error = |smooth: f64| {
         let mut sums = (0.0, 0.0);
         for views in points {
-            let symmetry = if views.len() > 1 { Symmetry::WhereUnseen } else { Symmetry::Exact };
             let Some(fit) = PointFit::new(views, &settings.optics, settings.grid) else { continue };
             // A wrong α would ask for more smoothing.
-            let tried = settings.alpha.map_or(vec![0.0, 0.25, 0.5, 0.75, 1.0], |alpha| vec![alpha]);
-            let errors = tried.iter().filter_map(|alpha| held_out_error(&fit, *alpha, smooth, symmetry));
+            let errors =
+                tried(settings).into_iter().filter_map(|alpha| held_out_error(&fit, alpha, smooth, fit.symmetry()));
             let (misfit, weight) = errors.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or_default();
             sums.0 += misfit;
             sums.1 += weight;

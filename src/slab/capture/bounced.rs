@@ -139,10 +139,14 @@ pub struct AboveFloor {
 
 impl AboveFloor {
     pub fn new(table: RingTable, views: &[View]) -> Self {
-        let all = views.iter().flat_map(|View { o, samples }| samples.iter().map(move |sample| (*o, sample)));
-        let value = |(o, sample): (DVec3, &Sample)| (sample.irradiance, table.read(sample.i, o));
-        let values: Vec<(f64, f64)> = all.filter(|(_, sample)| sample.btdf.is_finite()).map(value).collect();
-        Self { floor: diffuse_part(&values), table }
+        let of_table = |o: DVec3, sample: &Sample| {
+            // A broken sample stays broken.
+            Sample { btdf: if sample.btdf.is_finite() { table.read(sample.i, o) } else { f64::NAN }, ..*sample }
+        };
+        let values: Vec<Vec<Sample>> =
+            views.iter().map(|View { o, samples }| samples.iter().map(|at| of_table(*o, at)).collect()).collect();
+        let floor = diffuse_part(&values.iter().map(Vec::as_slice).collect::<Vec<_>>());
+        Self { floor, table }
     }
 
     /// BTDF [1/sr] at a pair of directions.

@@ -29,11 +29,13 @@ pub(super) struct Equation {
     pub ln_bottom: f64,
     pub top: Stencil,
     pub bottom: Stencil,
-    /// Logarithm of the measured BTDF, bounded below.
+    /// Logarithm of the measured BTDF, bounded below or [linearised](PointFit::linearised).
     pub ln_btdf: f64,
     /// `ρ / (ρ + floor)`: equal weights would let dark dots decide. The floor is a part of the peak, of the BTDF and of the
     /// radiance: what a camera adds to all pixels is large in the BTDF of dots that shine weakly.
     pub weight: f64,
+    /// BTDF [1/sr].
+    pub floor: f64,
     pub sample: Sample,
 }
 
@@ -108,7 +110,7 @@ impl PointFit {
                     peak_density = peak_density.max(ln_btdf - 0.5 * (terms.ln_top + terms.ln_bottom));
                 }
                 let (ln_top, ln_bottom) = (terms.ln_top, terms.ln_bottom);
-                equations.push(Equation { ln_top, ln_bottom, top, bottom, ln_btdf, weight, sample: *sample });
+                equations.push(Equation { ln_top, ln_bottom, top, bottom, ln_btdf, weight, floor, sample: *sample });
             }
         }
         (peak_density > f64::MIN).then_some(Self { grid, equations, rim: peak_density + RIM, views: views.len() })
@@ -153,6 +155,11 @@ impl PointFit {
         }
     }
 
+    /// The symmetry of the first solution: exact for one camera, which cannot tell α from skewness.
+    pub fn symmetry(&self) -> Symmetry {
+        if self.views > 1 { Symmetry::WhereUnseen } else { Symmetry::Exact }
+    }
+
     /// The weighted sum of squares of Eq. 15 over the equations for which `takes_part` is true, and the sum of the weights.
     pub fn misfit(&self, alpha: f64, x: &[f64], takes_part: impl Fn(usize) -> bool) -> (f64, f64) {
         let mut sums = (0.0, 0.0);
@@ -162,6 +169,22 @@ impl PointFit {
             sums.1 += equation.weight * equation.weight;
         }
         sums
+    }
+
+    /// The equations with each logarithm linearised about a first solution, and weighted by it: noise makes the logarithm of
+    /// a sample too small, and makes bright samples weigh more than dark ones. Samples above twice the solution stay as they
+    /// are.
+    pub fn linearised(mut self, alpha: f64, x: &[f64]) -> Self {
+        for equation in &mut self.equations {
+            let ln_model = equation.ln_model(alpha, x);
+            let model = ln_model.exp();
+            let excess = equation.sample.btdf / model - 1.0;
+            if excess < 1.0 {
+                equation.ln_btdf = ln_model + excess;
+                equation.weight = model / (model + equation.floor);
+            }
+        }
+        self
     }
 
     /// Relative L2 of the model against the samples.

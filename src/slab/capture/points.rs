@@ -39,9 +39,13 @@ impl Point {
         let of_cameras: Vec<Vec<DVec3>> =
             radiances.iter().map(|values| lights.iter().zip(*values).map(btdf).collect()).collect();
         let diffuse = DVec3::from_array([0, 1, 2].map(|channel| {
-            let pairs = of_cameras.iter().flat_map(|values| values.iter().zip(&lights));
-            let finite = pairs.filter(|(value, _)| value.is_finite());
-            diffuse_part(&finite.map(|(value, light)| (light.irradiance, value[channel])).collect::<Vec<_>>())
+            let sample = |(light, value): (&DotLight, &DVec3)| {
+                let btdf = if value.is_finite() { value[channel] } else { f64::NAN };
+                Sample { i: light.i, irradiance: light.irradiance, btdf }
+            };
+            let views: Vec<Vec<Sample>> =
+                of_cameras.iter().map(|values| lights.iter().zip(values).map(sample).collect()).collect();
+            diffuse_part(&views.iter().map(Vec::as_slice).collect::<Vec<_>>())
         }));
         let mut color = DVec3::ZERO;
         let mut broken = 0;

@@ -93,15 +93,14 @@ impl KnownPoint {
         };
         let mut radiances: Vec<f64> = lights.iter().map(radiance).collect();
         add_noise(&mut radiances, noise, &mut ChaCha8Rng::seed_from_u64(5));
-        let btdf = |(light, radiance): (&DotLight, &f64)| (light.irradiance, light.btdf(radiance.max(0.0), 1.0));
-        let values: Vec<(f64, f64)> = lights.iter().zip(&radiances).map(btdf).collect();
-        let diffuse = diffuse_part(&values);
-        let sample = |(light, (irradiance, btdf)): (&DotLight, &(f64, f64))| Sample {
-            i: light.i,
-            irradiance: *irradiance,
-            btdf: (btdf - diffuse).max(0.0),
+        let sample = |(light, radiance): (&DotLight, &f64)| {
+            let btdf = light.btdf(radiance.max(0.0), 1.0);
+            Sample { i: light.i, irradiance: light.irradiance, btdf }
         };
-        View { o, samples: lights.iter().zip(&values).map(sample).collect() }
+        let mut samples: Vec<Sample> = lights.iter().zip(&radiances).map(sample).collect();
+        let diffuse = diffuse_part(&[&samples]);
+        samples.iter_mut().for_each(|sample| sample.btdf = (sample.btdf - diffuse).max(0.0));
+        View { o, samples }
     }
 
     /// Relative L2 of lobes over the disc of the light, for views at 0, 30 and 60°.
