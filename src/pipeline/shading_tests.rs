@@ -1,8 +1,9 @@
 use glam::Vec3;
 
+use super::{FEW_FACETS, enough_facets};
 use crate::base::Cancel;
 use crate::effective::{Reflectance, Representation};
-use crate::metrics::image_pairs;
+use crate::metrics::{Errors, image_pairs};
 use crate::pipeline::Pipeline;
 use crate::scene::{self, LoadedScene};
 
@@ -54,4 +55,30 @@ fn drafts_of_a_weave_and_of_rods_read_tables_within_their_tolerance() {
         eprintln!("{geometry}: table {is_table}, {errors:?}");
         assert!(is_table && errors.rel_l2 <= 0.35 && errors.psnr_db >= 26.0, "{geometry}: {is_table} {errors:?}");
     }
+}
+
+#[test]
+fn the_predicted_number_of_facets_keeps_both_tolerances() {
+    let tolerance = (0.08, 38.0);
+    // Squares of the errors of the grid, and variances of one facet: relative, and over the squared peak.
+    for (grid, variance) in [
+        ([1e-3, 5e-5], [0.5, 0.02]),
+        ([2e-3, 1e-4], [4.0, 0.01]),
+        ([0.0, 0.0], [3.0, 0.1]),
+        ([3e-4, 1e-5], [1e-3, 1e-4]),
+    ] {
+        let errors = |facets: f64| {
+            let [relative, absolute] = [0, 1].map(|k| grid[k] + variance[k] / facets);
+            Errors { rel_l2: relative.sqrt(), psnr_db: -10.0 * absolute.log10() }
+        };
+        let enough = enough_facets(errors(f64::INFINITY), errors(FEW_FACETS as f64), tolerance);
+        let found = errors(enough as f64);
+        assert!(found.rel_l2 <= tolerance.0 && found.psnr_db >= tolerance.1, "{enough}: {found:?}");
+        let fewer = errors(enough as f64 / 1.2);
+        let is_least = enough == FEW_FACETS || fewer.rel_l2 > tolerance.0 || fewer.psnr_db < tolerance.1;
+        assert!(is_least, "{enough}: {fewer:?}");
+    }
+    let exact = Errors { rel_l2: tolerance.0, psnr_db: tolerance.1 };
+    let few = Errors { rel_l2: 0.1, psnr_db: 36.0 };
+    assert_eq!(enough_facets(exact, few, tolerance), usize::MAX, "no number is enough");
 }
