@@ -255,7 +255,7 @@ impl Shading {
             if facets >= 2 * FEW_FACETS
                 && let Some(of_few) = trial(Some(FEW_FACETS))?
             {
-                part = Some(enough_facets(of_all, of_few, self.tolerance)).filter(|part| *part <= facets / 2);
+                part = Some(enough_facets(of_all, of_few, self.tolerance, facets)).filter(|part| *part <= facets / 2);
             }
         } else if facets >= 2 * FEW_FACETS && COARSE_TABLE_NODES.contains(&count) {
             part = Some(FEW_FACETS);
@@ -311,15 +311,17 @@ impl Shading {
     }
 }
 
-/// The number of facets that keeps a tolerance, from the errors with all facets and with [`FEW_FACETS`]: the squared error is
-/// that of the grid and a variance in inverse proportion to this number.
-fn enough_facets(of_all: Errors, of_few: Errors, tolerance: (f64, f64)) -> usize {
+/// The number of `facets` that keeps a tolerance, from the errors with all of them and with [`FEW_FACETS`]: the squared error is
+/// that of the grid and a variance in proportion to `1/number - 1/facets`.
+fn enough_facets(of_all: Errors, of_few: Errors, tolerance: (f64, f64), facets: usize) -> usize {
     let mean_square = |psnr_db: f64| 10_f64.powf(-0.1 * psnr_db);
     let relative = [of_all.rel_l2, of_few.rel_l2, tolerance.0].map(|error| error * error);
     let absolute = [of_all.psnr_db, of_few.psnr_db, tolerance.1].map(mean_square);
     let ratio = |[all, few, most]: [f64; 3]| (few - all) / (most - all);
-    // An infinite number of facets is all of them.
-    ((MARGIN * FEW_FACETS as f64 * ratio(relative).max(ratio(absolute))) as usize).max(FEW_FACETS)
+    let least = ratio(relative).max(ratio(absolute));
+    let of_one = 1.0 / facets as f64;
+    let number = 1.0 / (of_one + (1.0 / FEW_FACETS as f64 - of_one) / least);
+    ((MARGIN * number) as usize).max(FEW_FACETS)
 }
 
 /// The form of f̄ that images read.

@@ -46,7 +46,8 @@ const FREE_IS_BETTER: f64 = 0.4;
 const OUTER: f64 = 0.8;
 const MAX_GROWTH: f64 = 0.01;
 
-/// Fits the model of one point. For each α, the distribution is solved anew. One camera takes the α that makes the product
+/// Fits the model of one point to samples whose logarithms are [linearised](PointFit::linearised). For each α, the distribution is
+/// solved anew. One camera takes the α that makes the product
 /// of Eqs. 15 and 18 least while the distribution is point symmetric, and then frees the distribution if that predicts
 /// held-out samples much better: noise alone also makes a distribution skewed. Eq. 18 alone, with the distribution kept while α
 /// moves as in the paper, hardly moves where the distribution is narrow in the plane of incidence.
@@ -60,17 +61,15 @@ pub fn fit_point(views: &[View], settings: &FitSettings) -> Option<Fitted> {
 
 /// Fits samples without light that is reflected inside.
 fn fit_lobe(views: &[View], settings: &FitSettings) -> Option<Fitted> {
-    let fit = linearised(PointFit::new(views, &settings.optics, settings.grid)?, settings)?;
+    let measured = PointFit::new(views, &settings.optics, settings.grid)?;
+    let fit = linearised(&measured, settings)?;
     let alpha = match settings.alpha {
         Some(alpha) => alpha,
         None if views.len() > 1 => least(|alpha| misfit(&fit, alpha, settings.smooth)),
         None => symmetric_alpha(&fit, settings.smooth)?,
     };
-    let x = if views.len() > 1 {
-        fit.solve(alpha, settings.smooth, Symmetry::WhereUnseen, |_| true)?
-    } else {
-        second_pass(&fit, alpha, settings.smooth)?
-    };
+    let x = fit.solve(alpha, settings.smooth, fit.symmetry(), |_| true)?;
+    let x = if views.len() > 1 { x } else { second_pass(&measured, x, alpha, settings.smooth)? };
     let residual = fit.residual(alpha, &x);
     let (model, scale) = fit.model(alpha, x);
     (scale > 0.0 && residual.is_finite()).then_some(Fitted { model, scale, residual, floor: 0.0 })
@@ -83,7 +82,7 @@ fn tried(settings: &FitSettings) -> Vec<f64> {
 
 /// The equations linearised about the solution of the α that fits their logarithms best among a few. For each of these α the
 /// distribution follows the samples, so that a nearby one is as good.
-fn linearised(fit: PointFit, settings: &FitSettings) -> Option<PointFit> {
+fn linearised(fit: &PointFit, settings: &FitSettings) -> Option<PointFit> {
     let solution = |alpha: f64| {
         let x = fit.solve(alpha, settings.smooth, fit.symmetry(), |_| true)?;
         Some((fit.misfit(alpha, &x, |_| true).0, alpha, x))
@@ -92,16 +91,17 @@ fn linearised(fit: PointFit, settings: &FitSettings) -> Option<PointFit> {
     Some(fit.linearised(alpha, &x))
 }
 
-/// The second pass of one camera: the free distribution if it predicts held-out samples much better than the symmetric one, and
-/// if it does not grow at the rim, where few dots hold it.
-fn second_pass(fit: &PointFit, alpha: f64, smooth: f64) -> Option<Vec<f64>> {
-    let symmetric = fit.solve(alpha, smooth, Symmetry::Exact, |_| true)?;
-    let error = |symmetry| held_out_error(fit, alpha, smooth, symmetry).map_or(f64::MAX, |(misfit, _)| misfit);
+/// The second pass of one camera: the free distribution if it predicts held-out samples much better than a symmetric one, and
+/// if it does not grow at the rim, where few dots hold it; else `symmetric`. The measured equations decide, because those
+/// that are linearised about a symmetric distribution are in its favour.
+fn second_pass(measured: &PointFit, symmetric: Vec<f64>, alpha: f64, smooth: f64) -> Option<Vec<f64>> {
+    let error = |symmetry| held_out_error(measured, alpha, smooth, symmetry).map_or(f64::MAX, |(misfit, _)| misfit);
     if error(Symmetry::WhereUnseen) >= FREE_IS_BETTER * error(Symmetry::Exact) {
         return Some(symmetric);
     }
-    let free = fit.solve(alpha, smooth, Symmetry::WhereUnseen, |_| true);
-    let outside = |x: &[f64]| fit.model(alpha, x.to_vec()).0.outside(OUTER);
+    let free = |fit: &PointFit| fit.solve(alpha, smooth, Symmetry::WhereUnseen, |_| true);
+    let free = free(&measured.linearised(alpha, &free(measured)?));
+    let outside = |x: &[f64]| measured.model(alpha, x.to_vec()).0.outside(OUTER);
     Some(free.filter(|free| outside(free) < outside(&symmetric) + MAX_GROWTH).unwrap_or(symmetric))
 }
 

@@ -24,6 +24,7 @@ pub struct View {
 }
 
 /// A sample inside the grid of slopes, as an equation of Eq. 16.
+#[derive(Clone)]
 pub(super) struct Equation {
     pub ln_top: f64,
     pub ln_bottom: f64,
@@ -31,7 +32,8 @@ pub(super) struct Equation {
     pub bottom: Stencil,
     /// Logarithm of the measured BTDF, bounded below or [linearised](PointFit::linearised).
     pub ln_btdf: f64,
-    /// `ρ / (ρ + floor)`: equal weights would let dark dots decide. The floor is a part of the peak, of the BTDF and of the
+    /// `ρ / (ρ + floor)`, where ρ is the measured BTDF or, once linearised, that of the first solution: equal weights would
+    /// let dark dots decide. The floor is a part of the peak, of the BTDF and of the
     /// radiance: what a camera adds to all pixels is large in the BTDF of dots that shine weakly.
     pub weight: f64,
     /// BTDF [1/sr].
@@ -171,11 +173,12 @@ impl PointFit {
         sums
     }
 
-    /// The equations with each logarithm linearised about a first solution, and weighted by it: noise makes the logarithm of
-    /// a sample too small, and makes bright samples weigh more than dark ones. Samples above twice the solution stay as they
-    /// are.
-    pub fn linearised(mut self, alpha: f64, x: &[f64]) -> Self {
-        for equation in &mut self.equations {
+    /// The equations with each logarithm linearised about a first solution, and weighted by it: noise makes the mean of
+    /// logarithms too small, and a sample that it makes brighter would weigh more than one that it makes darker. Samples
+    /// above twice the solution stay as they are.
+    pub fn linearised(&self, alpha: f64, x: &[f64]) -> Self {
+        let mut equations = self.equations.clone();
+        for equation in &mut equations {
             let ln_model = equation.ln_model(alpha, x);
             let model = ln_model.exp();
             let excess = equation.sample.btdf / model - 1.0;
@@ -184,7 +187,7 @@ impl PointFit {
                 equation.weight = model / (model + equation.floor);
             }
         }
-        self
+        Self { equations, ..*self }
     }
 
     /// Relative L2 of the model against the samples.

@@ -7,7 +7,7 @@ use super::clusters::non_negative;
 use super::fit::{Sample, View};
 use super::lobe::{LobeOptics, PointModel};
 use super::push_pull::DirectionGrid;
-use super::radiance::{DotLight, diffuse_part};
+use super::radiance::{DotLight, dark_samples, diffuse_of};
 use super::rig::Rig;
 
 /// Part of the diffuse BTDF below which the rest is no lobe.
@@ -38,15 +38,16 @@ impl Point {
         };
         let of_cameras: Vec<Vec<DVec3>> =
             radiances.iter().map(|values| lights.iter().zip(*values).map(btdf).collect()).collect();
-        let diffuse = DVec3::from_array([0, 1, 2].map(|channel| {
-            let sample = |(light, value): (&DotLight, &DVec3)| {
-                let btdf = if value.is_finite() { value[channel] } else { f64::NAN };
-                Sample { i: light.i, irradiance: light.irradiance, btdf }
-            };
-            let views: Vec<Vec<Sample>> =
-                of_cameras.iter().map(|values| lights.iter().zip(values).map(sample).collect()).collect();
-            diffuse_part(&views.iter().map(Vec::as_slice).collect::<Vec<_>>())
-        }));
+        // Lobes of all channels have the same shape, so that their mean tells which samples are dark.
+        let mean = |(light, value): (&DotLight, &DVec3)| {
+            let btdf = if value.is_finite() { value.element_sum() / 3.0 } else { f64::NAN };
+            Sample { i: light.i, irradiance: light.irradiance, btdf }
+        };
+        let means: Vec<Vec<Sample>> =
+            of_cameras.iter().map(|values| lights.iter().zip(values).map(mean).collect()).collect();
+        let dark = dark_samples(&means.iter().map(Vec::as_slice).collect::<Vec<_>>());
+        let diffuse =
+            DVec3::from_array([0, 1, 2].map(|channel| diffuse_of(&dark, |view, k| of_cameras[view][k][channel])));
         let mut color = DVec3::ZERO;
         let mut broken = 0;
         let mut view = |o: DVec3, values: &[DVec3]| {

@@ -30,9 +30,9 @@ impl DotLight {
     }
 }
 
-/// Part of the cells of directions that count as dark.
+/// Part of the half cells of directions that count as dark.
 const LOWEST: f64 = 0.05;
-/// Dots per cell, and the number of cells below which cells hold fewer.
+/// Dots per cell, and the number of cells below which cells hold fewer, but at least two.
 const PER_CELL: usize = 8;
 const LEAST_CELLS: usize = 20;
 
@@ -40,49 +40,68 @@ const LEAST_CELLS: usize = 20;
 ///
 /// The paper takes the least of all values whose radiance exceeds 0.05 of the mean, against noise. A sheet without a diffuse
 /// part has no dark value there, and the least of noisy values is too small. Here, the dots of at least the median
-/// irradiance count, whose values have the least noise, and the median of values in the darkest cells of directions is taken.
-/// One half of a cell's values decides whether the other half counts, so that noise does not select small values.
+/// irradiance count, whose values have the least noise, and the median of [dark](dark_samples) values is taken.
 pub fn diffuse_part(views: &[&[Sample]]) -> f64 {
-    let finite = |samples: &[Sample]| -> Vec<Sample> {
-        samples.iter().filter(|sample| sample.btdf.is_finite()).copied().collect()
-    };
-    let views: Vec<Vec<Sample>> = views.iter().map(|samples| finite(samples)).collect();
-    let Some(strong) = median(views.iter().flatten().map(|sample| sample.irradiance).collect()) else { return 0.0 };
+    diffuse_of(&dark_samples(views), |view, k| views[view][k].btdf)
+}
+
+/// The diffuse part of one channel from the values of dark samples, given by camera and number.
+pub(super) fn diffuse_of(dark: &[(usize, usize)], btdf: impl Fn(usize, usize) -> f64) -> f64 {
+    median(dark.iter().map(|(view, k)| btdf(*view, *k)).collect()).map_or(0.0, |value| value.max(0.0))
+}
+
+/// The samples in the darkest cells of directions, by camera and number. One half of a cell decides whether the other half counts,
+/// so that noise does not select small values.
+pub(super) fn dark_samples(views: &[&[Sample]]) -> Vec<(usize, usize)> {
+    let finite =
+        |samples: &&[Sample]| -> Vec<usize> { (0..samples.len()).filter(|k| samples[*k].btdf.is_finite()).collect() };
+    let finite: Vec<Vec<usize>> = views.iter().map(finite).collect();
+    let irradiances = finite.iter().zip(views).flat_map(|(all, samples)| all.iter().map(|k| samples[*k].irradiance));
+    let Some(strong) = median(irradiances.collect()) else { return Vec::new() };
     let mut halves = Vec::new();
-    for samples in &views {
-        let strong: Vec<Sample> = samples.iter().filter(|sample| sample.irradiance >= strong).copied().collect();
-        for cell in cells(&strong) {
-            let half = |k: usize| cell.iter().skip(k).step_by(2).copied().collect::<Vec<f64>>();
+    for (view, (mut all, samples)) in finite.into_iter().zip(views).enumerate() {
+        all.retain(|k| samples[*k].irradiance >= strong);
+        for cell in cells(samples, all) {
+            let half = |first: usize| cell.iter().skip(first).step_by(2).copied().collect::<Vec<usize>>();
             let (even, odd) = (half(0), if cell.len() > 1 { half(1) } else { half(0) });
-            halves.extend(median(even.clone()).map(|key| (key, odd.clone())));
-            halves.extend(median(odd).map(|key| (key, even)));
+            let darkness = |half: &[usize]| median(half.iter().map(|k| samples[*k].btdf).collect());
+            let keys = (darkness(&even), darkness(&odd));
+            halves.extend(keys.0.map(|key| (key, view, odd)));
+            halves.extend(keys.1.map(|key| (key, view, even)));
         }
     }
     halves.sort_by(|a, b| a.0.total_cmp(&b.0));
     let count = ((LOWEST * halves.len() as f64) as usize).max(2);
-    median(halves.into_iter().take(count).flat_map(|(_, values)| values).collect()).map_or(0.0, |value| value.max(0.0))
+    let half = |(_, view, half): (f64, usize, Vec<usize>)| half.into_iter().map(move |k| (view, k));
+    halves.into_iter().take(count).flat_map(half).collect()
 }
 
-/// The values of samples by square cells of directions (i.x, i.y). A cell of one sample is left out if cells hold several.
-fn cells(samples: &[Sample]) -> Vec<Vec<f64>> {
-    let per_cell = (samples.len() / LEAST_CELLS).clamp(1, PER_CELL);
-    let side = ((samples.len() / per_cell) as f64).sqrt().floor().max(1.0);
-    let place = |sample: &Sample| sample.i.truncate();
-    let low = samples.iter().map(place).fold(DVec2::MAX, DVec2::min);
-    let span = (samples.iter().map(place).fold(DVec2::MIN, DVec2::max) - low).max(DVec2::splat(f64::MIN_POSITIVE));
+/// Some of the samples by even cells of directions (i.x, i.y). Cells of one sample are left out unless all samples are few.
+fn cells(samples: &[Sample], chosen: Vec<usize>) -> Vec<Vec<usize>> {
+    let least = if chosen.len() < 2 * PER_CELL { 1 } else { 2 };
+    let per_cell = (chosen.len() / LEAST_CELLS).clamp(least, PER_CELL);
+    let side = ((chosen.len() / per_cell) as f64).sqrt().floor().max(1.0);
+    let place = |k: &usize| samples[*k].i.truncate();
+    let low = chosen.iter().map(place).fold(DVec2::MAX, DVec2::min);
+    let span = (chosen.iter().map(place).fold(DVec2::MIN, DVec2::max) - low).max(DVec2::splat(f64::MIN_POSITIVE));
     let mut cells = vec![Vec::new(); (side * side) as usize];
-    for sample in samples {
-        let at = ((place(sample) - low) / span * side).floor().min(DVec2::splat(side - 1.0));
-        cells[(at.y * side + at.x) as usize].push(sample.btdf);
+    for k in chosen {
+        let at = ((place(&k) - low) / span * side).floor().min(DVec2::splat(side - 1.0));
+        cells[(at.y * side + at.x) as usize].push(k);
     }
     cells.retain(|cell| cell.len() > usize::from(per_cell > 1));
     cells
 }
 
-/// The upper median; `None` without a value.
+/// The median; `None` without a value.
 fn median(mut values: Vec<f64>) -> Option<f64> {
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+    let (middle, is_even) = (values.len() / 2, values.len().is_multiple_of(2));
+    if values.is_empty() {
+        return None;
+    }
+    let (below, upper, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
+    let lower = below.iter().copied().fold(f64::MIN, f64::max);
+    Some(if is_even { 0.5 * (lower + *upper) } else { *upper })
 }
 
 #[cfg(test)]
@@ -107,7 +126,7 @@ mod tests {
     fn samples(btdf: impl Fn(DVec2) -> f64) -> Vec<Sample> {
         let at = |k: usize| DVec2::new((k % 40) as f64, (k / 40) as f64) / 20.0 - 1.0;
         let sample = |k: usize| {
-            let weak = k / 40 >= 20;
+            let weak = k / 40 >= 21;
             let value = if weak { at(k).x } else { btdf(at(k)) };
             Sample { i: (0.7 * at(k)).extend(0.7), irradiance: if weak { 0.1 } else { 1.0 }, btdf: value }
         };
@@ -122,11 +141,21 @@ mod tests {
     fn the_diffuse_part_is_the_floor_below_a_lobe_and_weak_dots_and_one_noisy_value_do_not_change_it() {
         let mut values = samples(|at| 0.02 + lobe(at + DVec2::new(0.0, 0.4), 0.2));
         assert!((diffuse_part(&[&values]) - 0.02).abs() < 1e-6);
-        (values[39].btdf, values[1500].btdf) = (0.0, f64::NAN);
+        values[39].btdf = 0.0;
+        assert!((diffuse_part(&[&values]) - 0.02).abs() < 1e-6);
+        values[..40].iter_mut().step_by(3).for_each(|sample| sample.btdf = f64::NAN);
         assert!((diffuse_part(&[&values]) - 0.02).abs() < 1e-6);
         assert_eq!(diffuse_part(&[]), 0.0);
         assert_eq!(diffuse_part(&[&[Sample { i: DVec3::Z, irradiance: 0.0, btdf: 0.0 }; 4]]), 0.0);
         assert_eq!(diffuse_part(&[&[Sample { i: DVec3::Z, irradiance: 1.0, btdf: f64::NAN }]]), 0.0);
+    }
+
+    #[test]
+    fn one_dark_value_of_few_dots_does_not_decide() {
+        let mut values: Vec<Sample> = samples(|_| 0.02).into_iter().step_by(25).collect();
+        assert_eq!(values.len(), 64);
+        values[3].btdf = 0.0;
+        assert!((diffuse_part(&[&values]) - 0.02).abs() < 1e-6, "{}", diffuse_part(&[&values]));
     }
 
     #[test]
