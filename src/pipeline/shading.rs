@@ -28,13 +28,15 @@ const STRIDES: [usize; 4] = [27, 17, 10, 3];
 /// The largest ratio of error and tolerance at which halving the grid step may still help.
 const MAX_ERROR_RATIO: f64 = 2.5;
 
-/// Smallest number of facets from which a table is computed, drawn for each half vector by their lobes. Tables with a node
-/// count in `COARSE_TABLE_NODES`, those of drafts, are first computed from this number without a trial.
-const FEW_FACETS: usize = 256;
-const COARSE_TABLE_NODES: Range<usize> = 4_000..20_000;
+/// A table may be computed from 1/20, 1/10, 1/5 or 1/2 of the facets, drawn for each half vector by their lobes. 1/20 and
+/// 1/10 are tried only if at least `MIN_SAMPLED_FACETS` remain.
+const SUBSET_DIVISORS: [usize; 4] = [20, 10, 5, 2];
+const MIN_SAMPLED_FACETS: usize = 1600;
 
-/// Facets of a table over those that a trial predicts to be enough.
-const MARGIN: f64 = 1.1;
+/// Tables with a node count in `COARSE_TABLE_NODES`, those of drafts, are computed first from this number of facets, without a
+/// trial. If the error is too large, they are computed again from all facets.
+const COARSE_FACETS: usize = 256;
+const COARSE_TABLE_NODES: Range<usize> = 4_000..20_000;
 
 /// Tables of more nodes are first computed only where the pairs of the check read them, at about 10,000 nodes.
 const MIN_TRIAL_NODES: usize = 60_000;
@@ -224,7 +226,7 @@ impl Shading {
     }
 
     /// A table on one grid. A large one is computed only if a trial of some of its nodes is close enough, and from as few
-    /// facets as a second trial predicts to be enough.
+    /// facets as are close enough.
     fn attempt(
         &self,
         grid: HemispherePairGrid,
@@ -240,30 +242,29 @@ impl Shading {
             }
             _ => 0,
         };
-        let nodes = Nodes { mirrors, ..Nodes::all(grid) };
+        let mut nodes = Nodes { mirrors, ..Nodes::all(grid) };
         let count = grid.originals(mirrors);
-        let mut part = None;
         if count > MIN_TRIAL_NODES {
             let mut trial = |facets: Option<usize>| -> Result<Option<Errors>> {
                 let trial = self.tabulate(Nodes { facets, read_by: Some(&check.pairs), ..nodes }, cancel, times)?;
                 Ok(trial.map(|trial| check.errors(&self.with_table(trial))))
             };
-            let Some(of_all) = trial(None)? else { return Ok(Attempt::Impossible) };
-            if !self.is_close(of_all) {
-                return Ok(Attempt::TooFar(of_all));
+            let Some(best) = trial(None)? else { return Ok(Attempt::Impossible) };
+            if !self.is_close(best) {
+                return Ok(Attempt::TooFar(best));
             }
-            if facets >= 2 * FEW_FACETS
-                && let Some(of_few) = trial(Some(FEW_FACETS))?
+            for part in SUBSET_DIVISORS
+                .into_iter()
+                .filter(|part| facets > 0 && (*part <= 5 || facets >= MIN_SAMPLED_FACETS * part))
             {
-                part = Some(enough_facets(of_all, of_few, self.tolerance, facets)).filter(|part| *part <= facets / 2);
+                if trial(Some(facets / part))?.is_some_and(|errors| self.is_close(errors)) {
+                    nodes.facets = Some(facets / part);
+                    break;
+                }
             }
-        } else if facets >= 2 * FEW_FACETS && COARSE_TABLE_NODES.contains(&count) {
-            part = Some(FEW_FACETS);
-        }
-        if part.is_some() {
-            let Some(table) = self.tabulate(Nodes { facets: part, ..nodes }, cancel, times)? else {
-                return Ok(Attempt::Impossible);
-            };
+        } else if facets >= 2 * COARSE_FACETS && COARSE_TABLE_NODES.contains(&count) {
+            let part = Nodes { facets: Some(COARSE_FACETS), ..nodes };
+            let Some(table) = self.tabulate(part, cancel, times)? else { return Ok(Attempt::Impossible) };
             if self.is_close(check.errors(&self.with_table(table.clone()))) {
                 return Ok(Attempt::Table(table));
             }
@@ -309,19 +310,6 @@ impl Shading {
             _ => (None, same_lobes),
         }
     }
-}
-
-/// The number of `facets` that keeps a tolerance, from the errors with all of them and with [`FEW_FACETS`]: the squared error is
-/// that of the grid and a variance in proportion to `1/number - 1/facets`.
-fn enough_facets(of_all: Errors, of_few: Errors, tolerance: (f64, f64), facets: usize) -> usize {
-    let mean_square = |psnr_db: f64| 10_f64.powf(-0.1 * psnr_db);
-    let relative = [of_all.rel_l2, of_few.rel_l2, tolerance.0].map(|error| error * error);
-    let absolute = [of_all.psnr_db, of_few.psnr_db, tolerance.1].map(mean_square);
-    let ratio = |[all, few, most]: [f64; 3]| (few - all) / (most - all);
-    let least = ratio(relative).max(ratio(absolute));
-    let of_one = 1.0 / facets as f64;
-    let number = 1.0 / (of_one + (1.0 / FEW_FACETS as f64 - of_one) / least);
-    ((MARGIN * number) as usize).max(FEW_FACETS)
 }
 
 /// The form of f̄ that images read.

@@ -1,9 +1,8 @@
 use glam::Vec3;
 
-use super::{FEW_FACETS, enough_facets};
 use crate::base::Cancel;
 use crate::effective::{Reflectance, Representation};
-use crate::metrics::{Errors, image_pairs};
+use crate::metrics::image_pairs;
 use crate::pipeline::Pipeline;
 use crate::scene::{self, LoadedScene};
 
@@ -39,14 +38,10 @@ fn images_read_one_table_of_direct_and_of_bounced_light() {
 }
 
 #[test]
-fn images_of_a_weave_and_of_rods_read_tables_within_their_tolerance() {
-    for (geometry, preset, [rel_l2, psnr_db]) in [
-        ("{ kind = \"weave\" }", "draft", [0.35, 26.0]),
-        ("{ kind = \"rods\" }", "draft", [0.35, 26.0]),
-        ("{ kind = \"weave\" }", "standard", [0.08, 38.0]),
-    ] {
+fn drafts_of_a_weave_and_of_rods_read_tables_within_their_tolerance() {
+    for geometry in ["{ kind = \"weave\" }", "{ kind = \"rods\" }"] {
         let source = format!(
-            "[tile]\ngeometry = {geometry}\n[quality]\npreset = \"{preset}\"\nbackend = \"cpu\"\nmethod = \"direct\"\n\
+            "[tile]\ngeometry = {geometry}\n[quality]\npreset = \"draft\"\nbackend = \"cpu\"\nmethod = \"direct\"\n\
              [effects]\npicture_table = \"on\"\n"
         );
         let scene = scene::parse(&source).unwrap();
@@ -56,33 +51,7 @@ fn images_of_a_weave_and_of_rods_read_tables_within_their_tolerance() {
         let shading = outcome.shading_brdf(&Cancel::default()).unwrap();
         let is_table = matches!(shading.brdf.direct_representation(), Representation::Table(_));
         let errors = shading.errors.unwrap();
-        eprintln!("{geometry}, {preset}: table {is_table}, {errors:?}");
-        assert!(is_table && errors.rel_l2 <= rel_l2 && errors.psnr_db >= psnr_db, "{geometry}: {is_table} {errors:?}");
+        eprintln!("{geometry}: table {is_table}, {errors:?}");
+        assert!(is_table && errors.rel_l2 <= 0.35 && errors.psnr_db >= 26.0, "{geometry}: {is_table} {errors:?}");
     }
-}
-
-#[test]
-fn the_predicted_number_of_facets_keeps_both_tolerances() {
-    let (tolerance, all) = ((0.08, 38.0), 8192.0);
-    // Squares of the errors of the grid, and variances of one facet: relative, and over the squared peak.
-    for (grid, variance) in [
-        ([1e-3, 5e-5], [0.5, 0.02]),
-        ([2e-3, 1e-4], [4.0, 0.01]),
-        ([0.0, 0.0], [3.0, 0.1]),
-        ([3e-4, 1e-5], [1e-3, 1e-4]),
-    ] {
-        let errors = |facets: f64| {
-            let [relative, absolute] = [0, 1].map(|k| grid[k] + variance[k] * (1.0 / facets - 1.0 / all));
-            Errors { rel_l2: relative.sqrt(), psnr_db: -10.0 * absolute.log10() }
-        };
-        let enough = enough_facets(errors(all), errors(FEW_FACETS as f64), tolerance, all as usize);
-        let found = errors(enough as f64);
-        assert!(found.rel_l2 <= tolerance.0 && found.psnr_db >= tolerance.1, "{enough}: {found:?}");
-        let fewer = errors(enough as f64 / 1.2);
-        let is_least = enough == FEW_FACETS || fewer.rel_l2 > tolerance.0 || fewer.psnr_db < tolerance.1;
-        assert!(is_least, "{enough}: {fewer:?}");
-    }
-    let exact = Errors { rel_l2: tolerance.0, psnr_db: tolerance.1 };
-    let few = Errors { rel_l2: 0.1, psnr_db: 36.0 };
-    assert!(enough_facets(exact, few, tolerance, 8192) >= 8192, "only all facets are enough");
 }
