@@ -33,10 +33,13 @@ const MAX_ERROR_RATIO: f64 = 2.5;
 const SUBSET_DIVISORS: [usize; 4] = [20, 10, 5, 2];
 const MIN_SAMPLED_FACETS: usize = 1600;
 
-/// Tables with a node count in `COARSE_TABLE_NODES`, those of drafts, are computed first from this number of facets, without a
-/// trial. If the error is too large, they are computed again from all facets.
-const COARSE_FACETS: usize = 256;
-const COARSE_TABLE_NODES: Range<usize> = 4_000..20_000;
+/// Tables with a node count in `COARSE_TABLE_NODES` are computed first from a quarter of the facets, without a trial. If the error is
+/// too large, they are computed again from all facets.
+const COARSE_SUBSET_DIVISOR: usize = 4;
+const COARSE_TABLE_NODES: Range<usize> = 10_000..20_000;
+
+/// The factor by which fewer facets may raise the error of a table.
+const MAX_ERROR_GROWTH: f64 = 1.25;
 
 /// Tables of more nodes are first computed only where the pairs of the check read them, at about 10,000 nodes.
 const MIN_TRIAL_NODES: usize = 60_000;
@@ -225,8 +228,8 @@ impl Shading {
         self.exact.with_direct_representation(Representation::Table(table.read(self.interpolation)))
     }
 
-    /// A table on one grid. A large one is computed only if a trial of some of its nodes is close enough, and from as few
-    /// facets as are close enough.
+    /// A table on one grid. A large one is computed only if a trial of some of its nodes is close enough, and from
+    /// fewer facets if that is no worse.
     fn attempt(
         &self,
         grid: HemispherePairGrid,
@@ -257,13 +260,16 @@ impl Shading {
                 .into_iter()
                 .filter(|part| facets > 0 && (*part <= 5 || facets >= MIN_SAMPLED_FACETS * part))
             {
-                if trial(Some(facets / part))?.is_some_and(|errors| self.is_close(errors)) {
+                let sampled = trial(Some(facets / part))?;
+                let is_as_good =
+                    |errors: Errors| self.is_close(errors) && errors.rel_l2 < MAX_ERROR_GROWTH * best.rel_l2;
+                if sampled.is_some_and(is_as_good) {
                     nodes.facets = Some(facets / part);
                     break;
                 }
             }
-        } else if facets >= 2 * COARSE_FACETS && COARSE_TABLE_NODES.contains(&count) {
-            let part = Nodes { facets: Some(COARSE_FACETS), ..nodes };
+        } else if facets > 0 && COARSE_TABLE_NODES.contains(&count) {
+            let part = Nodes { facets: Some(facets / COARSE_SUBSET_DIVISOR), ..nodes };
             let Some(table) = self.tabulate(part, cancel, times)? else { return Ok(Attempt::Impossible) };
             if self.is_close(check.errors(&self.with_table(table.clone()))) {
                 return Ok(Attempt::Table(table));
