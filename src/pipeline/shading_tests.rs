@@ -36,3 +36,22 @@ fn images_read_one_table_of_direct_and_of_bounced_light() {
     assert!(norm > 0.0 && error < 0.1, "{error}");
     assert!(shading.errors.unwrap().rel_l2 < 0.1, "{:?}", shading.errors);
 }
+
+#[test]
+fn drafts_of_a_weave_and_of_rods_read_tables_within_their_tolerance() {
+    for geometry in ["{ kind = \"weave\" }", "{ kind = \"rods\" }"] {
+        let source = format!(
+            "[tile]\ngeometry = {geometry}\n[quality]\npreset = \"draft\"\nbackend = \"cpu\"\nmethod = \"direct\"\n\
+             [effects]\npicture_table = \"on\"\n"
+        );
+        let scene = scene::parse(&source).unwrap();
+        let loaded =
+            LoadedScene { scene, base_dir: "".into(), name: "test".to_owned(), painted: scene::Painted::default() };
+        let outcome = Pipeline::new().effective(&loaded).unwrap();
+        let shading = outcome.shading_brdf(&Cancel::default()).unwrap();
+        let is_table = matches!(shading.brdf.direct_representation(), Representation::Table(_));
+        let errors = shading.errors.unwrap();
+        eprintln!("{geometry}: table {is_table}, {errors:?}");
+        assert!(is_table && errors.rel_l2 <= 0.35 && errors.psnr_db >= 26.0, "{geometry}: {is_table} {errors:?}");
+    }
+}

@@ -46,11 +46,11 @@ const FREE_IS_BETTER: f64 = 0.4;
 const OUTER: f64 = 0.8;
 const MAX_GROWTH: f64 = 0.01;
 
-/// Fits the model of one point to samples whose logarithms are [linearised](PointFit::linearised). For each α, the distribution is
-/// solved anew. One camera takes the α that makes the product
-/// of Eqs. 15 and 18 least while the distribution is point symmetric, and then frees the distribution if that predicts
-/// held-out samples much better: noise alone also makes a distribution skewed. Eq. 18 alone, with the distribution kept while α
-/// moves as in the paper, hardly moves where the distribution is narrow in the plane of incidence.
+/// Fits the model of one point to samples whose logarithms are [linearised](PointFit::linearised). For each α, the
+/// distribution is solved anew. One camera takes the α that makes the product of Eqs. 15 and 18 least while the distribution
+/// is point symmetric, and then frees the distribution if that predicts held-out samples much better: noise alone also makes
+/// a distribution skewed. Eq. 18 alone, with the distribution kept while α moves as in the paper, hardly moves where the
+/// distribution is narrow in the plane of incidence.
 ///
 /// Several cameras take the α of the least Eq. 15 without any symmetry, because one camera cannot tell α from skewness.
 /// Light that is reflected inside the slab is taken from the samples by the model, which is then fitted again.

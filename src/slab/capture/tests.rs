@@ -8,6 +8,9 @@ use super::fit::{PointFit, Symmetry};
 use super::lobe::{LobeOptics, SlopeGrid};
 use super::simulated::KnownPoint;
 
+/// Noise of the photographs, relative to each value.
+const NOISES: [f64; 3] = [0.0, 0.01, 0.05];
+
 fn beckmann(x: f64, y: f64, alpha: f64) -> KnownPoint {
     KnownPoint::analytic(Profile::Beckmann, DVec2::new(x, y), alpha).unwrap()
 }
@@ -29,8 +32,6 @@ fn lobes_at_new_views_come_back_within_3_3_and_5_per_cent_at_noise_0_1_and_5_per
         }
     }
 }
-
-const NOISES: [f64; 3] = [0.0, 0.01, 0.05];
 
 #[test]
 fn alpha_comes_back_to_0_03_for_isotropic_and_to_0_05_for_anisotropic_slopes_at_noise_up_to_5_per_cent() {
