@@ -221,9 +221,9 @@ impl Settings {
             tolerance: 0.04,
             tolerance_db: 41.0,
             image_grids: vec![
-                hemisphere_pair_grid(24, 48, 8, 12),
-                hemisphere_pair_grid(24, 48, 12, 16),
-                hemisphere_pair_grid(32, 64, 12, 16),
+                hemisphere_pair_grid(16, 32, 12, 12),
+                hemisphere_pair_grid(20, 40, 16, 16),
+                hemisphere_pair_grid(24, 48, 16, 20),
             ],
             image_tolerance: (0.08, 38.0),
             reference_facets: 16_384,
@@ -253,7 +253,7 @@ impl Settings {
                 normal_rings: 48,
                 tolerance: 0.12,
                 tolerance_db: 28.0,
-                image_grids: vec![hemisphere_pair_grid(16, 24, 6, 8)],
+                image_grids: vec![hemisphere_pair_grid(12, 24, 6, 10)],
                 image_tolerance: (0.35, 26.0),
                 ..standard
             },
@@ -273,7 +273,7 @@ impl Settings {
                 tolerance: 0.015,
                 tolerance_db: 48.0,
                 image_grids: if preset == Preset::Fine {
-                    vec![hemisphere_pair_grid(32, 64, 12, 16)]
+                    vec![hemisphere_pair_grid(20, 40, 16, 20), hemisphere_pair_grid(24, 48, 16, 20)]
                 } else {
                     Vec::new()
                 },

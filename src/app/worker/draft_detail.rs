@@ -8,12 +8,14 @@ use super::image_worker::ms;
 
 /// Time limit for a draft [ms].
 pub const DRAFT_MS: f64 = 45.0;
+/// Time limit for a draft of a surface that stays while its colours or materials change [ms].
+pub const KEPT_SURFACE_MS: f64 = 28.0;
 /// Time limit for the part that does not depend on the number of pixels: facets, visibility and table [ms].
 const MATERIAL_MS: f64 = 26.0;
 /// Part of this limit below which twice as many facets are expected to meet it.
 const ROOM: f64 = 0.45;
-/// Least time for shading [ms], so that a draft can be recognised.
-const MIN_SHADING_MS: f64 = 14.0;
+/// Smallest part of a time limit that is left for shading, so that a draft can be recognised.
+const MIN_SHADING: f64 = 0.3;
 /// Coarser levels than the preset's number of facets; each has half as many facets as the next.
 const COARSER: usize = 2;
 
@@ -74,9 +76,9 @@ impl DraftDetail {
         self.level.record(material_ms, MATERIAL_MS, has_finer.then_some(ROOM * MATERIAL_MS));
     }
 
-    /// Time that is left for the pixels of a draft that began at `start` [ms].
-    pub fn shading_ms(start: Instant) -> f64 {
-        (DRAFT_MS - ms(start)).max(MIN_SHADING_MS)
+    /// Time that a limit leaves for the pixels of a draft that began at `start` [ms].
+    pub fn shading_ms(limit: f64, start: Instant) -> f64 {
+        (limit - ms(start)).max(MIN_SHADING * limit)
     }
 }
 

@@ -12,7 +12,7 @@ use crate::render::tile_view::TileScene;
 use crate::scene::{Camera, LoadedScene};
 
 use super::dark;
-use super::draft_detail::{DRAFT_MS, DraftDetail};
+use super::draft_detail::{DRAFT_MS, DraftDetail, KEPT_SURFACE_MS};
 use super::gpu_drafts::{GpuDrafts, as_preset};
 use super::pixel_costs::{PixelCosts, Shading, fitting};
 use super::preview_renderer::{CloseUpTile, KnownPoints, PreviewRenderer, RenderRequest, ShadedMaterial};
@@ -93,7 +93,7 @@ impl ImageWorker {
             return self.render_slab(job, Grade::Draft, fitting(job.size, MAX_PIXELS[0]), cancel);
         }
         if let Some(outcome) = self.shared.known(&job.loaded) {
-            let size = self.affordable(job, Shading::Refined, DraftDetail::shading_ms(start));
+            let size = self.affordable(job, Shading::Refined, DraftDetail::shading_ms(DRAFT_MS, start));
             return self.render(
                 job,
                 ShadedMaterial::Outcome(&outcome.without_times()),
@@ -115,12 +115,14 @@ impl ImageWorker {
             }
             Ok(outcome)
         });
-        let has_new_surface = |outcome: &Outcome| outcome.times.iter().any(|(name, _)| *name == "facets");
+        let has_new_surface = |outcome: &Outcome| outcome.times.iter().any(|(name, _)| *name == "geometry");
+        let mut limit = KEPT_SURFACE_MS;
         if outcome.as_ref().map_or(true, has_new_surface) {
             self.detail.record(ms(material_start));
+            limit = DRAFT_MS;
         }
         let outcome = outcome?;
-        let size = self.affordable(job, Shading::Draft, DraftDetail::shading_ms(start));
+        let size = self.affordable(job, Shading::Draft, DraftDetail::shading_ms(limit, start));
         self.render(job, ShadedMaterial::Outcome(&outcome), Shading::Draft, size, 1, cancel)
     }
 

@@ -9,7 +9,7 @@ use super::facet_groups::{FacetGroup, NormalCluster, cluster_value, normal_clust
 use crate::brdf::{LobeAngles, Material, Measured, Term, analytic_lobe};
 use crate::geometry::Facets;
 use crate::math::simd;
-use crate::math::simd::PairVectors;
+use crate::math::simd::{Lobe, PairVectors};
 
 /// Facets grouped by slot, in arrays that the inner loops read.
 #[derive(Debug, Clone)]
@@ -194,26 +194,16 @@ impl FacetSum {
         total
     }
 
-    fn group_sum(&self, group: &FacetGroup, pair: &PairVectors, v_i_all: &[f32], v_o_all: &[f32]) -> DVec3 {
+    fn group_sum(&self, group: &FacetGroup, pair: &PairVectors, v_i: &[f32], v_o: &[f32]) -> DVec3 {
         if let Some(clusters) = &group.clusters {
-            return clusters.iter().map(|cluster| self.cluster_sum(group, cluster, pair, v_i_all, v_o_all)).sum();
+            return clusters.iter().map(|cluster| self.cluster_sum(group, cluster, pair, v_i, v_o)).sum();
         }
-        let range = group.range.clone();
-        let (v_i, v_o) = (&v_i_all[range.clone()], &v_o_all[range.clone()]);
-        let normals = self.normals(range.clone());
         let mut total = DVec3::ZERO;
         for (lobe, term) in &group.lobes {
-            let tint = term.tint(pair.i_dot_h).as_dvec3();
-            total += tint
-                * match &group.rgb_areas {
-                    None => {
-                        DVec3::splat(simd::lobe_sums(*lobe, pair, normals, [&self.areas[range.clone()]], v_i, v_o)[0])
-                    }
-                    Some([r, g, b]) => DVec3::from_array(simd::lobe_sums(*lobe, pair, normals, [r, g, b], v_i, v_o)),
-                };
+            total += term.tint(pair.i_dot_h).as_dvec3() * self.lobe_sum(group, *lobe, pair, v_i, v_o);
         }
         for table in &group.measured {
-            total += self.measured_sum(group, table.as_ref(), pair, v_i_all, v_o_all);
+            total += self.measured_sum(group, table.as_ref(), pair, v_i, v_o);
         }
         total
     }
@@ -227,16 +217,40 @@ impl FacetSum {
         v_o: &[f32],
     ) -> DVec3 {
         let Some(value) = cluster_value(group, cluster, pair) else { return DVec3::ZERO };
+        self.visible_area(group, cluster, v_i, v_o) * value.as_dvec3()
+    }
+
+    /// The sum of one lobe over a group's facets, without its tint and the group's colour: by channel where the colour weights
+    /// of facets differ, else three times the same. `v_i` and `v_o` are the visibilities of all facets.
+    pub(crate) fn lobe_sum(
+        &self,
+        group: &FacetGroup,
+        lobe: Lobe,
+        pair: &PairVectors,
+        v_i: &[f32],
+        v_o: &[f32],
+    ) -> DVec3 {
+        let range = group.range.clone();
+        let (v_i, v_o) = (&v_i[range.clone()], &v_o[range.clone()]);
+        let normals = self.normals(range.clone());
+        match &group.rgb_areas {
+            None => DVec3::splat(simd::lobe_sums(lobe, pair, normals, [&self.areas[range]], v_i, v_o)[0]),
+            Some([r, g, b]) => DVec3::from_array(simd::lobe_sums(lobe, pair, normals, [r, g, b], v_i, v_o)),
+        }
+    }
+
+    /// The area of one normal cluster that is visible from both directions, by channel as in [`FacetSum::lobe_sum`].
+    pub(crate) fn visible_area(&self, group: &FacetGroup, cluster: &NormalCluster, v_i: &[f32], v_o: &[f32]) -> DVec3 {
         let range = cluster.range.clone();
-        let area = match &group.rgb_areas {
-            None => DVec3::splat(simd::masked_sum([&self.areas[range.clone()]], &v_i[range.clone()], &v_o[range])[0]),
+        let (v_i, v_o) = (&v_i[range.clone()], &v_o[range.clone()]);
+        match &group.rgb_areas {
+            None => DVec3::splat(simd::masked_sum([&self.areas[range]], v_i, v_o)[0]),
             Some(rgb) => {
                 let inside = range.start - group.range.start..range.end - group.range.start;
                 let [r, g, b] = rgb.each_ref().map(|areas| &areas[inside.clone()]);
-                DVec3::from_array(simd::masked_sum([r, g, b], &v_i[range.clone()], &v_o[range]))
+                DVec3::from_array(simd::masked_sum([r, g, b], v_i, v_o))
             }
-        };
-        area * value.as_dvec3()
+        }
     }
 
     /// Number of normal clusters of the reflecting groups; `None` if one of these groups has none.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::brdf::{LobeAngles, Measured, Term};
 use crate::effective::{FacetSum, Tint};
@@ -42,26 +42,31 @@ impl Column {
             if facets.is_black {
                 continue;
             }
+            // The channels of one quantity follow each other, because one loop over the facets sums all of them.
             let channels: &[Option<usize>] =
                 if facets.rgb_areas.is_some() { &[Some(0), Some(1), Some(2)] } else { &[None] };
-            for &channel in channels {
-                let mut add = |kind| columns.push(Self { group, kind, channel });
-                match &facets.clusters {
-                    Some(clusters) if clusters.len() <= MAX_NORMALS => {
-                        (0..clusters.len()).for_each(|cluster| add(ColumnKind::Area(cluster)));
-                    }
-                    _ => {
-                        (0..facets.lobes.len()).for_each(|lobe| add(ColumnKind::Lobe(lobe)));
-                        for table in 0..facets.measured.len() {
-                            // Colour weights that differ between facets already select one channel.
-                            let colors = channel.map_or(0..3, |channel| channel..channel + 1);
-                            colors.for_each(|color| add(ColumnKind::Measured { table, color }));
-                        }
+            let mut add = |kind| columns.extend(channels.iter().map(|&channel| Self { group, kind, channel }));
+            match &facets.clusters {
+                Some(clusters) if clusters.len() <= MAX_NORMALS => {
+                    (0..clusters.len()).for_each(|cluster| add(ColumnKind::Area(cluster)));
+                }
+                _ => {
+                    (0..facets.lobes.len()).for_each(|lobe| add(ColumnKind::Lobe(lobe)));
+                    for table in 0..facets.measured.len() {
+                        columns.extend((0..3).map(|color| {
+                            let channel = facets.rgb_areas.is_some().then_some(color);
+                            Self { group, kind: ColumnKind::Measured { table, color }, channel }
+                        }));
                     }
                 }
             }
         }
         (columns.len() <= MAX_COLUMNS).then_some(columns)
+    }
+
+    /// Number of columns that hold the channels of the same quantity as this one, its own included.
+    fn channels(&self) -> usize {
+        if self.channel.is_some() || matches!(self.kind, ColumnKind::Measured { .. }) { 3 } else { 1 }
     }
 
     /// The facets that a column sums over.
@@ -83,25 +88,20 @@ impl Column {
         v_o: &[f32],
         out: &mut [f32],
     ) {
-        // One loop over the facets gives all channels of a measured BRDF.
-        let mut last = None;
-        for (column, out) in columns.iter().zip(out) {
-            let Self { group, channel, .. } = *column;
-            *out = match column.kind {
-                ColumnKind::Lobe(lobe) => sum.lobe_sum(group, lobe, channel, pair, v_i, v_o),
-                ColumnKind::Area(cluster) => sum.visible_area(group, cluster, channel, v_i, v_o),
-                ColumnKind::Measured { table, color } => {
-                    let colors = match last {
-                        Some((of, colors)) if of == (group, table) => colors,
-                        _ => {
-                            let group = &sum.groups()[group];
-                            sum.measured_sum(group, group.measured[table].as_ref(), pair, v_i, v_o)
-                        }
-                    };
-                    last = Some(((group, table), colors));
-                    colors[color]
+        let mut first = 0;
+        while let Some(column) = columns.get(first) {
+            let group = &sum.groups()[column.group];
+            let sums = match (column.kind, &group.clusters) {
+                (ColumnKind::Lobe(lobe), _) => sum.lobe_sum(group, group.lobes[lobe].0, pair, v_i, v_o),
+                (ColumnKind::Area(cluster), Some(clusters)) => sum.visible_area(group, &clusters[cluster], v_i, v_o),
+                (ColumnKind::Area(_), None) => DVec3::ZERO,
+                (ColumnKind::Measured { table, .. }, _) => {
+                    sum.measured_sum(group, group.measured[table].as_ref(), pair, v_i, v_o)
                 }
-            } as f32;
+            };
+            let count = column.channels();
+            out[first..first + count].copy_from_slice(&sums.as_vec3().to_array()[..count]);
+            first += count;
         }
     }
 

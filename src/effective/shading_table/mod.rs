@@ -8,7 +8,6 @@
 
 pub(crate) mod columns;
 pub(crate) mod content;
-mod facet_columns;
 #[cfg(test)]
 mod half_floats_tests;
 pub(crate) mod sampled_facets;

@@ -101,7 +101,7 @@ impl SampledFacets {
 
 /// A probability in `(0, 1]` as an integer fraction of [`CERTAIN`].
 fn as_integer(probability: f32) -> u32 {
-    (probability * CERTAIN as f32).round().clamp(1.0, CERTAIN as f32) as u32
+    ((probability * CERTAIN as f32 + 0.5) as u32).clamp(1, CERTAIN)
 }
 
 /// Probabilities in `(0, 1]` in proportion to `shares`, which sum to 1. Their sum is about `count`, and not more.
@@ -170,8 +170,9 @@ impl FacetSum {
     /// clusters.
     fn sampled(&self, subset: &SampledFacets, groups: Vec<(Range<usize>, Option<Vec<NormalCluster>>)>) -> Self {
         let facets = || subset.facets.iter().zip(&subset.weights);
-        let areas = facets().map(|(&s, weight)| self.facet(s).1 * weight).collect();
-        let normals = [0, 1, 2].map(|axis| subset.facets.iter().map(|&s| self.facet(s).0[axis]).collect());
+        let all = self.areas(0..self.facet_count());
+        let areas = facets().map(|(&s, weight)| all[s] * weight).collect();
+        let normals = self.normals(0..self.facet_count()).map(|all| subset.facets.iter().map(|&s| all[s]).collect());
         let groups = self.groups().iter().zip(groups).map(|(group, (range, clusters))| {
             let weighted = |areas: &Vec<f32>| -> Vec<f32> {
                 let of_group = facets().skip(range.start).take(range.len());
