@@ -108,6 +108,7 @@ const MEASUREMENTS: &[(&str, &str, Source)] = &[
         in_lib("figure_7_by_the_slab_by_one_refraction"),
     ),
     ("slabs", "errors of the models of slabs against photons, and their times: minutes", Source::Here(slabs)),
+    ("table-grids", "errors of shading tables on grids of different shapes", Source::Here(grids)),
     ("table-steps", "errors of shading tables against facets, azimuths and nodes", Source::Here(steps)),
     ("table-trials", "times of the trial of a shading table and of the whole table", Source::Here(trials)),
 ];
@@ -199,6 +200,11 @@ fn slabs(_: Option<&str>, table: &mut Table) -> Result<(), String> {
 
 fn trials(_: Option<&str>, table: &mut Table) -> Result<(), String> {
     shading_tables::trials(&mut |line| table.line(line));
+    Ok(())
+}
+
+fn grids(_: Option<&str>, table: &mut Table) -> Result<(), String> {
+    shading_tables::grids(&mut |line| table.line(line));
     Ok(())
 }
 

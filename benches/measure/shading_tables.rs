@@ -33,11 +33,10 @@ fn tabulated(outcome: &Outcome, direct: &Direct, nodes: Nodes<'_>) -> EffectiveB
 /// error.
 pub fn trials(print: &mut dyn FnMut(String)) {
     let pairs = image_pairs(512, 12345);
-    let grid = HemispherePairGrid { rings: 24, azimuths: 48, phi_d: 8, theta_d: 12 };
     print("scene                facets      trial     whole   rel. L2   PSNR".to_owned());
     for scene in ["table4_pillow", "table4_skirt", "fig7a_shot_silk", "fig6a_velvet_spread"] {
         let outcome = outcome(scene, &["quality.backend=cpu".to_owned()]);
-        let direct = direct(&outcome);
+        let (direct, grid) = (direct(&outcome), outcome.settings.image_grids[0]);
         let exact = values(&outcome.brdf, &pairs);
         for facets in [None, Some(direct.sum.facet_count() / 5)] {
             let timed = |read_by| {
@@ -63,7 +62,7 @@ pub fn steps(print: &mut dyn FnMut(String)) {
     print("scene                preset    facets subset  azimuths  nodes  rel. L2   PSNR".to_owned());
     let height_fields = ["table4_plate", "fig8b_ripples", "fig8d_leather"];
     let overhangs = ["table4_pillow", "table4_skirt", "fig6a_velvet_spread"];
-    for (preset, [rings, azimuths, phi_d, theta_d]) in [("standard", [24, 48, 8, 12]), ("fine", [32, 64, 12, 16])] {
+    for preset in ["standard", "fine"] {
         for scene in height_fields.into_iter().chain(overhangs) {
             let overrides = ["quality.backend=cpu".to_owned(), format!("quality.preset={preset}")];
             let on_cpu = outcome(scene, &overrides);
@@ -77,7 +76,7 @@ pub fn steps(print: &mut dyn FnMut(String)) {
             let gpu_grid = (gpu_azimuths, tile.input.nodes.unwrap().grid);
             let settings = &on_cpu.settings;
             let cpu_azimuths = if is_height_field { settings.horizon_azimuths } else { settings.slice_azimuths };
-            let cpu_grid = (cpu_azimuths, HemispherePairGrid { rings, azimuths, phi_d, theta_d });
+            let cpu_grid = (cpu_azimuths, settings.image_grids[0]);
             let exact = values(&on_cpu.brdf, &pairs);
             let all = settings.facets;
             let mut cases =
@@ -95,5 +94,28 @@ pub fn steps(print: &mut dyn FnMut(String)) {
                 ));
             }
         }
+    }
+}
+
+/// Prints the errors of tables from all facets on grids of different shapes.
+pub fn grids(print: &mut dyn FnMut(String)) {
+    let pairs = image_pairs(512, 12345);
+    // Rings and azimuths of half vectors, φ_d and θ_d.
+    let shapes =
+        [[24, 48, 8, 12], [20, 40, 12, 12], [16, 32, 12, 12], [20, 40, 12, 10], [24, 48, 12, 16], [20, 40, 16, 16]];
+    let name = |[rings, azimuths, phi_d, theta_d]: [usize; 4]| format!("{rings}x{azimuths}x{phi_d}x{theta_d}");
+    print(format!("{:<20} {}", "scene", shapes.map(|shape| format!("{:>12}", name(shape))).join(" ")));
+    for scene in
+        ["table4_plate", "fig8b_ripples", "fig8d_leather", "table4_pillow", "table4_skirt", "fig6a_velvet_spread"]
+    {
+        let outcome = outcome(scene, &["quality.backend=cpu".to_owned()]);
+        let exact = values(&outcome.brdf, &pairs);
+        let errors = shapes.map(|[rings, azimuths, phi_d, theta_d]| {
+            let nodes =
+                Nodes { read_by: Some(&pairs), ..Nodes::all(HemispherePairGrid { rings, azimuths, phi_d, theta_d }) };
+            let table = tabulated(&outcome, direct(&outcome), nodes);
+            format!("{:>10.2} %", 100.0 * upper_errors(&values(&table, &pairs), &exact).rel_l2)
+        });
+        print(format!("{scene:<20} {}", errors.join(" ")));
     }
 }

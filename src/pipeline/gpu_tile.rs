@@ -7,7 +7,6 @@ use crate::base::Result;
 use crate::effective::{
     FacetSum, GpuTileInput, GpuVisibilityInput, HeightMarchInput, Nodes, ShadowMapInput, SliceInput,
 };
-use crate::math::directions::HemispherePairGrid;
 use crate::plan::{Plan, Preset, Settings, VisibilityAlgorithm, VisibilityMethod};
 use crate::scene::{LoadedScene, Switch};
 
@@ -31,9 +30,6 @@ const FACETS_PER_HALF_VECTOR: usize = 1600;
 
 /// The most azimuths of visibility from which the GPU computes a table: on height fields, and under overhangs.
 const MAX_AZIMUTHS: [usize; 2] = [48, 96];
-
-/// The most rings and azimuths of half vectors of a table. The subsets of facets leave more error than larger steps.
-const MAX_HALF_VECTORS: [usize; 2] = [24, 48];
 
 /// Facets of a tile with few distinct normals, whose lobes are exact. The sequence that places facets spreads this many
 /// well over the shipped tiles; a stride through more of them would cover grooves and pyramids unevenly.
@@ -74,11 +70,7 @@ impl Pipeline {
         }
         // A clustered sum is exact between the nodes of a table as well.
         let wants_table = plan.try_shading_table && !is_clustered_tile;
-        let grid = settings.image_grids.last().filter(|_| wants_table).map(|grid| HemispherePairGrid {
-            rings: grid.rings.min(MAX_HALF_VECTORS[0]),
-            azimuths: grid.azimuths.min(MAX_HALF_VECTORS[1]),
-            ..*grid
-        });
+        let grid = settings.image_grids.last().copied().filter(|_| wants_table);
         let visibility_input = self.gpu_visibility(&inputs, grid.is_some(), &mut times)?;
         let is_large = grid.is_some_and(|grid| grid.nodes() > MIRRORS_FROM);
         let mirrors = if is_large && settings.effects.mirror_symmetry != Switch::Off {

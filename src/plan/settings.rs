@@ -220,11 +220,7 @@ impl Settings {
             keep_color: 0.999,
             tolerance: 0.04,
             tolerance_db: 41.0,
-            image_grids: vec![
-                hemisphere_pair_grid(16, 32, 12, 12),
-                hemisphere_pair_grid(20, 40, 16, 16),
-                hemisphere_pair_grid(24, 48, 16, 20),
-            ],
+            image_grids: vec![hemisphere_pair_grid(16, 32, 12, 12), hemisphere_pair_grid(20, 40, 16, 16)],
             image_tolerance: (0.08, 38.0),
             reference_facets: 16_384,
             reference_passes: 32,
@@ -273,7 +269,7 @@ impl Settings {
                 tolerance: 0.015,
                 tolerance_db: 48.0,
                 image_grids: if preset == Preset::Fine {
-                    vec![hemisphere_pair_grid(20, 40, 16, 20), hemisphere_pair_grid(24, 48, 16, 20)]
+                    vec![hemisphere_pair_grid(20, 40, 16, 20)]
                 } else {
                     Vec::new()
                 },
