@@ -8,9 +8,8 @@ use biscale::pipeline::{Outcome, Pipeline};
 use biscale::scene::{self, LoadedScene, Switch};
 use rayon::prelude::*;
 
-/// Stages that decide whether interreflection is computed, and those that compute it.
-const DECISION: [&str; 3] = ["lobe_samplers", "cells", "bounced_share"];
-const LIGHT: [&str; 3] = ["mirrors", "transport", "interreflection"];
+/// Stages of interreflection, unless the rest of an edit runs them too.
+const LIGHT: [&str; 6] = ["lobe_samplers", "cells", "hierarchy", "mirrors", "transport", "interreflection"];
 /// Edits per scene, whose median counts.
 const EDITS: u64 = 5;
 
@@ -42,7 +41,7 @@ pub fn bounced_share(part: Option<&str>, print: &mut dyn FnMut(String)) -> Resul
         };
         let full = share(&off, &on);
         let auto = outcome(&at(&loaded, Switch::Auto))?;
-        let times = times(&at(&loaded, Switch::On), &at(&loaded, Switch::Auto))?;
+        let times = times(&[Switch::Off, Switch::On, Switch::Auto].map(|switch| at(&loaded, switch)))?;
         let is_on = auto.plan.interreflection.is_some();
         ratios.push((told.share / full).max(full / told.share));
         if is_on {
@@ -101,21 +100,22 @@ fn albedo(brdf: &EffectiveBrdf) -> f64 {
     (0..grid.len()).into_par_iter().map(reflected).sum()
 }
 
-/// Times of edits of the geometry. Another seed draws other facets, and the last edit changes the height of the tile.
-fn times(on: &LoadedScene, auto: &LoadedScene) -> Result<Times, String> {
+/// Times of edits of the geometry: with interreflection off, on and decided by the plan. An edit changes the size of the tile.
+fn times(switched: &[LoadedScene; 3]) -> Result<Times, String> {
     let mut all: [Vec<f64>; 3] = Default::default();
     for edit in 0..EDITS {
         let edited = |loaded: &LoadedScene| {
             let mut scene = loaded.clone();
             scene.scene.tile.size *= 1.0 + 1e-3 * (edit + 1) as f32;
-            scene
+            let start = Instant::now();
+            Ok::<_, String>((outcome(&scene)?, start.elapsed().as_secs_f64() * 1e3))
         };
-        let start = Instant::now();
-        let with = outcome(&edited(on))?;
-        let whole = start.elapsed().as_secs_f64() * 1e3;
-        let light = sum(&with, &LIGHT);
-        let decided = outcome(&edited(auto))?;
-        let samples = [whole - light - sum(&with, &DECISION), sum(&decided, &DECISION), light];
+        let [(off, off_ms), (on, _), (decided, _)] =
+            [edited(&switched[0])?, edited(&switched[1])?, edited(&switched[2])?];
+        // Whatever the edit does without deciding is no part of the decision.
+        let like_decided = if decided.plan.interreflection.is_some() { &on } else { &off };
+        let light = added(&on, &off, |name| LIGHT.contains(&name));
+        let samples = [off_ms, added(&decided, like_decided, |_| true), light];
         all.iter_mut().zip(samples).for_each(|(all, ms)| all.push(ms));
     }
     let [without, decision, light] = all.map(|mut times| {
@@ -125,6 +125,8 @@ fn times(on: &LoadedScene, auto: &LoadedScene) -> Result<Times, String> {
     Ok(Times { without, decision, light })
 }
 
-fn sum(outcome: &Outcome, stages: &[&str]) -> f64 {
-    outcome.times.iter().filter(|(name, _)| stages.contains(name)).map(|(_, ms)| ms).sum()
+/// Milliseconds of the stages that ran in one outcome and not in another.
+fn added(outcome: &Outcome, other: &Outcome, counts: impl Fn(&str) -> bool) -> f64 {
+    let is_new = |name: &str| other.times.iter().all(|(known, _)| *known != name);
+    outcome.times.iter().filter(|(name, _)| counts(name) && is_new(name)).map(|(_, ms)| ms).sum()
 }

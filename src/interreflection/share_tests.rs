@@ -69,7 +69,8 @@ fn a_tile_whose_facets_see_nothing_of_each_other_runs_no_stage_of_interreflectio
         let pipeline = Pipeline::new();
         let outcome = pipeline.effective(&open(geometry, WHITE, "")).unwrap();
         assert!(outcome.plan.interreflection.is_none());
-        let stages = ["lobe_samplers", "bounced_share", "cells", "mirrors", "transport", "interreflection"];
+        let stages =
+            ["lobe_samplers", "bounced_share", "cells", "hierarchy", "mirrors", "transport", "interreflection"];
         let ran: Vec<_> =
             pipeline.runs().into_iter().filter(|(name, runs)| stages.contains(name) && *runs > 0).collect();
         assert!(ran.is_empty(), "{geometry}: {ran:?}");

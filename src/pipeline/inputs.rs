@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use super::features::Surface;
 use super::stages::{
-    BuildCells, FacetsRole, FindMirrorPlanes, MeasureBouncedShare, PrepareSamplers, Reflection, TileShape,
+    BuildCells, BuildHierarchy, FacetsRole, FindMirrorPlanes, MeasureBouncedShare, PrepareSamplers, Reflection,
+    TileShape,
 };
 use super::{Keyed, Pipeline, StageTimes};
 use crate::base::Result;
@@ -98,6 +99,7 @@ impl Pipeline {
             let samplers = &self.get(PrepareSamplers { materials }, times)?;
             let reflection = &Reflection { assignment, material_of_slot, materials, samplers };
             let grid = &self.get(BuildCells { tile }, times)?;
+            self.get(BuildHierarchy { tile, grid }, times)?;
             features.bounced = Some(*self.get(MeasureBouncedShare { tile, grid, reflection }, times)?);
         }
         if features.interreflects(settings) && settings.effects.mirror_symmetry == Switch::Auto {

@@ -48,9 +48,9 @@ pub use self::slab_values::{PHOTON_TARGET, SlabValues, require_faces};
 pub use self::stage::{Codec, Keyed, Stage, StageTimes};
 use self::stage::{Memo, elapsed_ms, lock};
 use self::stages::{
-    BuildCells, BuildTile, CastTransport, ColorFacets, ColorTile, ComputeVisibility, FacetsRole, FindMirrorPlanes,
-    Interreflect, LoadMaterials, MeasureBouncedShare, MeasureRelief, PaperTables, PrepareSamplers, Reflection,
-    SampleDrivers, SampleFacets, TileShape,
+    BuildCells, BuildHierarchy, BuildTile, CastTransport, ColorFacets, ColorTile, ComputeVisibility, FacetsRole,
+    FindMirrorPlanes, Interreflect, LoadMaterials, MeasureBouncedShare, MeasureRelief, PaperTables, PrepareSamplers,
+    Reflection, SampleDrivers, SampleFacets, TileShape,
 };
 use crate::base::{Cancel, Result};
 use crate::brdf::MaterialAssignment;
@@ -136,6 +136,7 @@ impl Pipeline {
             ComputeVisibility::NAME,
             FindMirrorPlanes::NAME,
             BuildCells::NAME,
+            BuildHierarchy::NAME,
             PrepareSamplers::NAME,
             MeasureBouncedShare::NAME,
             CastTransport::NAME,
@@ -366,6 +367,7 @@ impl Pipeline {
         let materials = &assignment.materials[..];
         let samplers = &self.get(PrepareSamplers { materials }, times)?;
         let grid = &self.get(BuildCells { tile }, times)?.value;
+        self.get(BuildHierarchy { tile, grid }, times)?;
         let transport = &self.get(CastTransport { tile, grid, facets, settings, refined }, times)?;
         let reflection = &Reflection { assignment: assignment.key, material_of_slot, materials, samplers };
         Ok(self.get(Interreflect { tile, facets, visibility, transport, reflection, settings, refined }, times)?.value)

@@ -16,4 +16,4 @@ pub(super) use interreflection::{
 pub(super) use paper::PaperTables;
 pub(super) use slab::{BuildFace, CorrelateFaces, FaceNormals, ReadSvbtdf, TraceInner};
 pub(super) use tile::{BuildTile, FacetsRole, LoadMaterials, SampleFacets, TileShape};
-pub(super) use visibility::{BuildCells, ComputeVisibility, EstimateScanWork};
+pub(super) use visibility::{BuildCells, BuildHierarchy, ComputeVisibility, EstimateScanWork};

@@ -124,3 +124,23 @@ impl Stage for BuildCells<'_> {
         Ok(PeriodicGrid::new(&self.tile.mesh))
     }
 }
+
+/// Builds the hierarchy of triangles that rays through the cells' grid read.
+pub struct BuildHierarchy<'a> {
+    pub tile: &'a Keyed<TileShape>,
+    pub grid: &'a PeriodicGrid,
+}
+
+impl Stage for BuildHierarchy<'_> {
+    type Output = ();
+    const NAME: &'static str = "hierarchy";
+
+    fn hash_into(&self, key: &mut KeyBuilder) {
+        key.key("surface", &self.tile.surface);
+    }
+
+    fn run(&self, _: &Env) -> Result<()> {
+        self.grid.prepare_rays();
+        Ok(())
+    }
+}
