@@ -8,7 +8,8 @@ use biscale::pipeline::{Outcome, Pipeline};
 use biscale::scene::{self, LoadedScene, Switch};
 use rayon::prelude::*;
 
-/// Stages of interreflection, unless the rest of an edit runs them too.
+/// The stage that decides whether interreflection is computed, and those that compute it, some of which it needs.
+const DECISION: &str = "bounced_share";
 const LIGHT: [&str; 6] = ["lobe_samplers", "cells", "hierarchy", "mirrors", "transport", "interreflection"];
 /// Edits per scene, whose median counts.
 const EDITS: u64 = 5;
@@ -112,10 +113,11 @@ fn times(switched: &[LoadedScene; 3]) -> Result<Times, String> {
         };
         let [(off, off_ms), (on, _), (decided, _)] =
             [edited(&switched[0])?, edited(&switched[1])?, edited(&switched[2])?];
-        // Whatever the edit does without deciding is no part of the decision.
-        let like_decided = if decided.plan.interreflection.is_some() { &on } else { &off };
-        let light = added(&on, &off, |name| LIGHT.contains(&name));
-        let samples = [off_ms, added(&decided, like_decided, |_| true), light];
+        let without = off_ms - sum(&off, |name| name == DECISION || LIGHT.contains(&name));
+        // Light that is computed needs the other stages anyway.
+        let is_off = decided.plan.interreflection.is_none();
+        let decision = sum(&decided, |name| name == DECISION || is_off && LIGHT.contains(&name));
+        let samples = [without, decision, sum(&on, |name| LIGHT.contains(&name))];
         all.iter_mut().zip(samples).for_each(|(all, ms)| all.push(ms));
     }
     let [without, decision, light] = all.map(|mut times| {
@@ -125,8 +127,7 @@ fn times(switched: &[LoadedScene; 3]) -> Result<Times, String> {
     Ok(Times { without, decision, light })
 }
 
-/// Milliseconds of the stages that ran in one outcome and not in another.
-fn added(outcome: &Outcome, other: &Outcome, counts: impl Fn(&str) -> bool) -> f64 {
-    let is_new = |name: &str| other.times.iter().all(|(known, _)| *known != name);
-    outcome.times.iter().filter(|(name, _)| counts(name) && is_new(name)).map(|(_, ms)| ms).sum()
+/// Milliseconds of the stages that count.
+fn sum(outcome: &Outcome, counts: impl Fn(&str) -> bool) -> f64 {
+    outcome.times.iter().filter(|(name, _)| counts(name)).map(|(_, ms)| ms).sum()
 }
