@@ -28,18 +28,14 @@ const STRIDES: [usize; 4] = [27, 17, 10, 3];
 /// The largest ratio of error and tolerance at which halving the grid step may still help.
 const MAX_ERROR_RATIO: f64 = 2.5;
 
-/// A table may be computed from 1/20, 1/10, 1/5 or 1/2 of the facets, drawn for each half vector by their lobes. 1/20 and
-/// 1/10 are tried only if at least `MIN_SAMPLED_FACETS` remain.
-const SUBSET_DIVISORS: [usize; 4] = [20, 10, 5, 2];
-const MIN_SAMPLED_FACETS: usize = 1600;
+/// Numbers of facets from which a table may be computed, if they are at most half of all: they are drawn for each half vector by
+/// their lobes. How many are enough depends little on how many there are.
+const SUBSETS: [usize; 3] = [1200, 3000, 8000];
 
 /// Tables with a node count in `COARSE_TABLE_NODES` are computed first from a quarter of the facets, without a trial. If the error is
 /// too large, they are computed again from all facets.
 const COARSE_SUBSET_DIVISOR: usize = 4;
 const COARSE_TABLE_NODES: Range<usize> = 10_000..20_000;
-
-/// The factor by which fewer facets may raise the error of a table.
-const MAX_ERROR_GROWTH: f64 = 1.25;
 
 /// Tables of more nodes are first computed only where the pairs of the check read them, at about 10,000 nodes.
 const MIN_TRIAL_NODES: usize = 60_000;
@@ -228,8 +224,8 @@ impl Shading {
         self.exact.with_direct_representation(Representation::Table(table.read(self.interpolation)))
     }
 
-    /// A table on one grid. A large one is computed only if a trial of some of its nodes is close enough, and from
-    /// fewer facets if that is no worse.
+    /// A table on one grid. A large one is computed only if a trial of some of its nodes is close enough, and from as few
+    /// facets as that needs.
     fn attempt(
         &self,
         grid: HemispherePairGrid,
@@ -252,22 +248,22 @@ impl Shading {
                 let trial = self.tabulate(Nodes { facets, read_by: Some(&check.pairs), ..nodes }, cancel, times)?;
                 Ok(trial.map(|trial| check.errors(&self.with_table(trial))))
             };
-            let Some(best) = trial(None)? else { return Ok(Attempt::Impossible) };
-            if !self.is_close(best) {
-                return Ok(Attempt::TooFar(best));
-            }
-            for part in SUBSET_DIVISORS
-                .into_iter()
-                .filter(|part| facets > 0 && (*part <= 5 || facets >= MIN_SAMPLED_FACETS * part))
-            {
-                let sampled = trial(Some(facets / part))?;
-                let is_as_good =
-                    |errors: Errors| self.is_close(errors) && errors.rel_l2 < MAX_ERROR_GROWTH * best.rel_l2;
-                if sampled.is_some_and(is_as_good) {
-                    nodes.facets = Some(facets / part);
+            // If the fewest facets are enough, nothing else is tried. If all are not, the grid is too coarse.
+            let mut order: Vec<_> = SUBSETS.into_iter().filter(|part| 2 * part <= facets).map(Some).collect();
+            order.insert(order.len().min(1), None);
+            let mut enough = None;
+            for part in order {
+                let Some(errors) = trial(part)? else { return Ok(Attempt::Impossible) };
+                let is_close = self.is_close(errors);
+                if is_close && part.is_some() {
+                    enough = part;
                     break;
                 }
+                if !is_close && part.is_none() {
+                    return Ok(Attempt::TooFar(errors));
+                }
             }
+            nodes.facets = enough;
         } else if facets > 0 && COARSE_TABLE_NODES.contains(&count) {
             let part = Nodes { facets: Some(facets / COARSE_SUBSET_DIVISOR), ..nodes };
             let Some(table) = self.tabulate(part, cancel, times)? else { return Ok(Attempt::Impossible) };
