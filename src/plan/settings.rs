@@ -249,7 +249,7 @@ impl Settings {
                 normal_rings: 48,
                 tolerance: 0.12,
                 tolerance_db: 28.0,
-                image_grids: vec![hemisphere_pair_grid(12, 24, 6, 10)],
+                image_grids: vec![hemisphere_pair_grid(16, 24, 6, 8)],
                 image_tolerance: (0.35, 26.0),
                 ..standard
             },
