@@ -269,7 +269,7 @@ impl Settings {
                 tolerance: 0.015,
                 tolerance_db: 48.0,
                 image_grids: if preset == Preset::Fine {
-                    vec![hemisphere_pair_grid(20, 40, 16, 20)]
+                    vec![hemisphere_pair_grid(24, 48, 16, 20)]
                 } else {
                     Vec::new()
                 },
