@@ -8,7 +8,7 @@ use biscale::pipeline::{Outcome, Pipeline};
 use biscale::scene::{self, LoadedScene, Switch};
 use rayon::prelude::*;
 
-/// The stage that decides whether interreflection is computed, and those that compute it, some of which it needs.
+/// The stage that decides whether interreflection is computed, and those that compute it; the decision needs the first three too.
 const DECISION: &str = "bounced_share";
 const LIGHT: [&str; 6] = ["lobe_samplers", "cells", "hierarchy", "mirrors", "transport", "interreflection"];
 /// Edits per scene, whose median counts.

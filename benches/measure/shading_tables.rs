@@ -81,8 +81,7 @@ pub fn steps(print: &mut dyn FnMut(String)) {
             let cpu_grid = (cpu_azimuths, settings.image_grids[0]);
             let exact = values(&on_cpu.brdf, &pairs);
             let all = settings.facets;
-            let mut cases =
-                vec![(all, cpu_grid), (3200, cpu_grid), (1600, cpu_grid), (1600, gpu_grid), (800, gpu_grid)];
+            let mut cases = vec![(all, cpu_grid), (3000, cpu_grid), (1200, cpu_grid), (1600, gpu_grid)];
             cases.dedup();
             for (count, (azimuths, grid)) in cases {
                 let outcome = if azimuths == gpu_azimuths { &as_on_gpu } else { &on_cpu };

@@ -28,8 +28,8 @@ const STRIDES: [usize; 4] = [27, 17, 10, 3];
 /// The largest ratio of error and tolerance at which halving the grid step may still help.
 const MAX_ERROR_RATIO: f64 = 2.5;
 
-/// Numbers of facets from which a table may be computed, if they are at most half of all: they are drawn for each half vector by
-/// their lobes. How many are enough depends little on how many there are.
+/// Numbers of facets to try for a table, each at most half of all: they are drawn for each half vector by their lobes. How many
+/// are enough depends little on how many there are.
 const SUBSETS: [usize; 3] = [1200, 3000, 8000];
 
 /// Tables with a node count in `COARSE_TABLE_NODES` are computed first from a quarter of the facets, without a trial. If the error is
@@ -38,7 +38,7 @@ const COARSE_SUBSET_DIVISOR: usize = 4;
 const COARSE_TABLE_NODES: Range<usize> = 10_000..20_000;
 
 /// Tables of more nodes are first computed only where the pairs of the check read them, at about 10,000 nodes.
-const MIN_TRIAL_NODES: usize = 60_000;
+const MIN_TRIAL_NODES: usize = 20_000;
 
 /// The effective BRDF as images read it.
 #[derive(Debug, Clone)]
@@ -155,7 +155,7 @@ impl Shading {
     }
 
     /// Adds the light that facets send to each other to a table, so that images read one table and a GPU can read it.
-    /// The table stays as it is if its grid is too coarse for this light.
+    /// The table stays as it is if its error with this light exceeds the bound.
     fn with_bounced_columns(&self, found: Found, check: &Check, cancel: &Cancel) -> Result<Found> {
         let Representation::Interreflecting(direct, bounced) = &found.brdf.representation else { return Ok(found) };
         let Representation::Table(table) = &**direct else { return Ok(found) };
@@ -187,7 +187,7 @@ impl Shading {
     /// The coarsest table that is close enough, and the errors of the last one that was tried.
     fn table(
         &self,
-        mut reused: Option<ShadingTable>,
+        reused: Option<ShadingTable>,
         check: &Check,
         cancel: &Cancel,
         times: &mut StageTimes,
@@ -195,12 +195,15 @@ impl Shading {
         let mut last = None;
         let known = reused.as_ref().map(|table| table.grid);
         let first = self.grids.iter().position(|grid| Some(*grid) == known).unwrap_or(0);
+        if let Some(table) = reused {
+            let brdf = self.with_table(table);
+            let errors = check.errors(&brdf);
+            if self.is_close(errors) {
+                return Ok((Some(brdf), Some(errors)));
+            }
+        }
         for grid in &self.grids[first..] {
-            let attempt = match reused.take() {
-                Some(table) => Attempt::Table(table),
-                None => self.attempt(*grid, check, cancel, times)?,
-            };
-            let errors = match attempt {
+            let errors = match self.attempt(*grid, check, cancel, times)? {
                 Attempt::Table(table) => {
                     let brdf = self.with_table(table);
                     let errors = check.errors(&brdf);
@@ -254,13 +257,13 @@ impl Shading {
             let mut enough = None;
             for part in order {
                 let Some(errors) = trial(part)? else { return Ok(Attempt::Impossible) };
-                let is_close = self.is_close(errors);
-                if is_close && part.is_some() {
-                    enough = part;
-                    break;
-                }
-                if !is_close && part.is_none() {
-                    return Ok(Attempt::TooFar(errors));
+                match (part, self.is_close(errors)) {
+                    (Some(_), true) => {
+                        enough = part;
+                        break;
+                    }
+                    (None, false) => return Ok(Attempt::TooFar(errors)),
+                    _ => {}
                 }
             }
             nodes.facets = enough;

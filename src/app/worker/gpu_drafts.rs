@@ -15,7 +15,7 @@ const PRESETS: [Preset; 2] = [Preset::Draft, Preset::Standard];
 /// Time limit for visibility and facet sum [ms]. A slower draft lowers the preset.
 const MAX_MS: f64 = 25.0;
 /// Time per preset below which the next finer one meets the limit [ms]. Each finer preset has three to five times the
-/// facets and up to six times the nodes of a table.
+/// facets and up to eleven times the nodes of a table.
 const MIN_MS: [f64; PRESETS.len()] = [2.0, 7.0];
 
 /// The tile of the last draft, and the current level of quality.

@@ -361,7 +361,7 @@ fn a_black_tile_has_a_table_without_columns_and_shades_black() {
     assert!(!radiance.is_empty() && radiance.iter().all(|&radiance| radiance == Vec3::ZERO));
 }
 
-/// Prints times of a table with the facets and the first grids of `draft` and `standard`.
+/// Prints times of tables of 18,432 nodes and of 110,592, with the facets of `draft` and `standard`.
 #[test]
 #[ignore = "a measurement: cargo bench --bench measure -- gpu-table"]
 fn the_table_of_a_height_field_is_timed() {

@@ -125,7 +125,8 @@ impl Stage for BuildCells<'_> {
     }
 }
 
-/// Builds the hierarchy of triangles that rays through the cells' grid read.
+/// Builds the hierarchy of triangles that rays through the cells' grid read, so that its time is stated apart. What casts rays
+/// builds it where it is missing.
 pub struct BuildHierarchy<'a> {
     pub tile: &'a Keyed<TileShape>,
     pub grid: &'a PeriodicGrid,
