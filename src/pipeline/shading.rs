@@ -25,7 +25,7 @@ use crate::visibility::Visibility;
 /// recurrence that placed the facets stays well spread.
 const STRIDES: [usize; 4] = [27, 17, 10, 3];
 
-/// The largest ratio of error and tolerance at which halving the grid step may still help.
+/// The largest ratio of error and tolerance at which a finer grid may still help.
 const MAX_ERROR_RATIO: f64 = 2.5;
 
 /// Numbers of facets to try for a table, each at most half of all: they are drawn for each half vector by their lobes. How many

@@ -8,7 +8,7 @@ use super::image_worker::ms;
 
 /// Time limit for a draft [ms].
 pub const DRAFT_MS: f64 = 45.0;
-/// Time limit for a draft of a surface that stays while its colours or materials change [ms].
+/// Time limit for a draft whose visibility stays, because only colours or materials change [ms].
 pub const KEPT_SURFACE_MS: f64 = 25.0;
 /// Time limit for the part that does not depend on the number of pixels: facets, visibility and table [ms].
 const MATERIAL_MS: f64 = 26.0;

@@ -115,7 +115,7 @@ impl ImageWorker {
             }
             Ok(outcome)
         });
-        let has_new_surface = |outcome: &Outcome| outcome.times.iter().any(|(name, _)| *name == "geometry");
+        let has_new_surface = |outcome: &Outcome| outcome.times.iter().any(|(name, _)| *name == "visibility");
         let mut limit = KEPT_SURFACE_MS;
         if outcome.as_ref().map_or(true, has_new_surface) {
             self.detail.record(ms(material_start));
