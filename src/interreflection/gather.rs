@@ -7,7 +7,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::mirrored::MirroredNodes;
+use super::mirrored::{MOST_IMAGES, MirroredNodes};
 use super::sampler::LobeSampler;
 use super::table::NodeWeights;
 use super::transport::{Ray, Vertex, first_density};
@@ -17,7 +17,7 @@ use crate::brdf::{LobeAngles, Material, Term, analytic_lobe};
 use crate::geometry::{Facets, TileMesh};
 use crate::math::directions::{ReducedGrid, half_vector};
 use crate::math::linalg::gemm::add_outer_products;
-use crate::math::simd::{Lobe, add_lobes_around};
+use crate::math::simd::{Lobe, add_lobes_around, masked_sum};
 use crate::visibility::Visibility;
 
 /// Groups of rays per matrix product.
@@ -50,9 +50,8 @@ struct Exchange<'a> {
     visibility: Vec<f32>,
     /// Mean visibility of each element over the nodes.
     openness: Vec<f32>,
-    /// Indices and components of the nodes that are viewers.
-    viewers: &'a [usize],
-    viewer_nodes: [Vec<f32>; 3],
+    /// The nodes that are viewers, and their images.
+    mirrored: &'a MirroredNodes,
     channels: usize,
     bounces: usize,
 }
@@ -87,10 +86,10 @@ pub fn gather(
 ) -> Result<InterreflectionTable> {
     let mirrored = MirroredNodes::new(settings.grid, settings.mirrors);
     let reflectors: Vec<Reflector> = materials.iter().zip(samplers).map(Reflector::new).collect();
-    let directions = (&settings.grid.directions()[..], &mirrored.computed[..]);
+    let directions = (&settings.grid.directions()[..], &mirrored);
     let surface = (facets, visibility, transport);
     let exchange = Exchange::new(surface, (material_of_slot, &reflectors), directions, settings.bounces);
-    let (nodes, viewers, channels) = (exchange.nodes[0].len(), exchange.viewers.len(), exchange.channels);
+    let (nodes, viewers, channels) = (exchange.nodes[0].len(), mirrored.computed.len(), exchange.channels);
     let (g, variance) = exchange.sum(&ViewerWeights::new(settings.grid, &mirrored), cancel)?;
     let scale = 1.0 / f64::from(mesh.base_area());
     let at = |pair: usize| {
@@ -105,6 +104,8 @@ pub fn gather(
 
 /// The weights of [`NodeWeights`], for all nodes and for the computed ones, which stand for their mirror images.
 struct ViewerWeights {
+    /// For each reflection, `viewers` at the images of the computed nodes, and zero at all others.
+    of_images: [Vec<f32>; MOST_IMAGES],
     viewers: Vec<f32>,
     lights: Vec<f32>,
     all_viewers: Vec<f32>,
@@ -119,8 +120,21 @@ impl ViewerWeights {
             mirrored.computed.iter().zip(&images).map(|(node, images)| weights[*node] as f32 * images).collect()
         };
         let of_all = |weights: &[f64]| weights.iter().map(|weight| *weight as f32).collect();
+        let of_computed_viewers = of_computed(&viewers);
+        let of_image = |reflection: usize| {
+            let mut all = vec![0.0; grid.len()];
+            if let Some(image) = mirrored.images.get(reflection) {
+                mirrored
+                    .computed
+                    .iter()
+                    .zip(&of_computed_viewers)
+                    .for_each(|(node, weight)| all[image[*node]] = *weight);
+            }
+            all
+        };
         Self {
-            viewers: of_computed(&viewers),
+            of_images: std::array::from_fn(of_image),
+            viewers: of_computed_viewers,
             lights: of_computed(&lights),
             all_viewers: of_all(&viewers),
             all_lights: of_all(&lights),
@@ -139,7 +153,7 @@ impl<'a> Exchange<'a> {
     fn new(
         (facets, visibility, transport): (&'a Facets, &Visibility, &'a Transport),
         (material_of_slot, all): (&[usize], &'a [Reflector<'a>]),
-        (nodes, viewers): (&[Vec3], &'a [usize]),
+        (nodes, mirrored): (&[Vec3], &'a MirroredNodes),
         bounces: usize,
     ) -> Self {
         let elements = &transport.facets;
@@ -157,12 +171,11 @@ impl<'a> Exchange<'a> {
             colors,
             openness: visibility
                 .par_chunks(nodes.len())
-                .map(|row| sum_of_products(row, |_| 1.0) / nodes.len() as f32)
+                .map(|row| row.iter().sum::<f32>() / nodes.len() as f32)
                 .collect(),
             visibility,
-            viewer_nodes: [0, 1, 2].map(|axis| viewers.iter().map(|node| nodes[*node][axis]).collect()),
             nodes: [0, 1, 2].map(|axis| nodes.iter().map(|node| node[axis]).collect()),
-            viewers,
+            mirrored,
             channels: if achromatic { 1 } else { 3 },
             bounces,
         }
@@ -171,8 +184,8 @@ impl<'a> Exchange<'a> {
     /// The sums over all rays, a matrix of lights and viewers per channel, and the sum of the variances of all pairs and
     /// three channels, weighted.
     fn sum(&self, weights: &ViewerWeights, cancel: &Cancel) -> Result<(Vec<f64>, f64)> {
-        let (nodes, viewers, channels) = (self.nodes[0].len(), self.viewers.len(), self.channels);
-        let groups = self.groups();
+        let (nodes, viewers, channels) = (self.nodes[0].len(), self.mirrored.computed.len(), self.channels);
+        let groups: Vec<(usize, Range<usize>)> = self.groups().into_iter().enumerate().collect();
         let mut g = vec![0.0_f64; channels * viewers * nodes];
         let rows = groups.len().min(BLOCK);
         let mut to_viewer = vec![0.0_f32; rows * channels * viewers];
@@ -187,9 +200,10 @@ impl<'a> Exchange<'a> {
                 .par_chunks_mut(channels * viewers)
                 .zip(from_light.par_chunks_mut(channels * nodes))
                 .zip(block)
-                .map(|((to_viewer, from_light), group)| {
-                    self.fill(group, to_viewer, from_light);
-                    is_examined(group, per_examined).then(|| self.variance(group, weights, [to_viewer, from_light]))
+                .map(|((to_viewer, from_light), (number, group))| {
+                    let reflection = self.fill((*number, group), weights, [&mut *to_viewer, &mut *from_light]);
+                    is_examined(group, per_examined)
+                        .then(|| self.variance((group, reflection), weights, [to_viewer, from_light]))
                 })
                 .collect();
             examined += of_groups.iter().flatten().count();
@@ -231,36 +245,76 @@ impl<'a> Exchange<'a> {
         groups
     }
 
-    /// Writes what a group of rays sends to each viewer, and what it carries from each light.
-    fn fill(&self, group: &Range<usize>, to_viewer: &mut [f32], from_light: &mut [f32]) {
+    /// Writes what a mirror image of a numbered group of rays sends to each viewer, and what it carries from each light. Returns the
+    /// reflection, which is chosen at random in proportion to what its image sends to all viewers.
+    fn fill(&self, (number, group): (usize, &Range<usize>), weights: &ViewerWeights, rows: [&mut [f32]; 2]) -> usize {
+        let [to_viewer, from_light] = rows;
         let Ray { element, direction, .. } = self.transport.rays[group.start];
         let element = element as usize;
         let normal = self.facets.normals[self.transport.facets[element] as usize];
         let away = if self.materials[element].is_matte { normal } else { direction };
-        let row = self.visible(element);
-        let visibility: Vec<f32> = self.viewers.iter().map(|node| row[*node]).collect();
+        let nodes = self.nodes[0].len();
+        let mut to_node = vec![0.0; self.channels * nodes];
+        self.add_lobe(element, [normal, away], Vec3::ONE, (&self.nodes, self.visible(element)), &mut to_node);
+        let of_images = weights.of_images.each_ref().map(Vec::as_slice);
+        let mut sent = [0.0; MOST_IMAGES];
+        for values in to_node.chunks(nodes) {
+            sent.iter_mut().zip(masked_sum(of_images, values, values)).for_each(|(sum, of_channel)| *sum += of_channel);
+        }
+        let sent = sent.map(f64::sqrt);
+        let total: f64 = sent.iter().sum();
         to_viewer.fill(0.0);
-        self.add_lobe(element, [normal, away], Vec3::ONE, (&self.viewer_nodes, &visibility), to_viewer);
         from_light.fill(0.0);
+        if total <= 0.0 {
+            return 0;
+        }
+        // Multiples of the golden ratio are even, also among neighbouring groups, which are alike.
+        let mut left = (number as f64 * (0.5 * (5.0_f64.sqrt() - 1.0))).fract() * total;
+        let mut reflection = 0;
+        while reflection + 1 < self.mirrored.images.len() && left >= sent[reflection] {
+            left -= sent[reflection];
+            reflection += 1;
+        }
+        let image = &self.mirrored.images[reflection];
+        let scale = (total / (sent[reflection] * self.mirrored.images.len() as f64)) as f32;
+        for (to_viewer, to_node) in to_viewer.chunks_mut(self.mirrored.computed.len()).zip(to_node.chunks(nodes)) {
+            let of_viewers = to_viewer.iter_mut().zip(&self.mirrored.computed);
+            of_viewers.for_each(|(value, node)| *value = scale * to_node[image[*node]]);
+        }
         group.clone().for_each(|ray| self.walk(ray, from_light));
+        self.reflect(reflection, from_light);
+        reflection
+    }
+
+    /// Moves the values of all nodes to their images.
+    fn reflect(&self, reflection: usize, values: &mut [f32]) {
+        if reflection > 0 {
+            for values in values.chunks_mut(self.nodes[0].len()) {
+                let before = values.to_vec();
+                let images = &self.mirrored.images[reflection];
+                values.iter_mut().zip(images).for_each(|(value, node)| *value = before[*node]);
+            }
+        }
     }
 
     /// The part of the weighted variance of all pairs that is due to a group of many independent rays. A ray contributes
     /// `a(o) b(i)`, and the values of swapped pairs are averaged: with `|a|²` and `a·b` weighted as viewers (`v`) or lights
     /// (`l`), `Σ ((a(o) b(i) + a(i) b(o))/2)² = (|a|²_v |b|²_l + |a|²_l |b|²_v + 2 (a·b)_v (a·b)_l)/4`.
-    fn variance(&self, group: &Range<usize>, weights: &ViewerWeights, [to_viewer, from_light]: [&[f32]; 2]) -> f64 {
-        let (viewers, nodes) = (self.viewers.len(), self.nodes[0].len());
+    fn variance(
+        &self,
+        (group, reflection): (&Range<usize>, usize),
+        weights: &ViewerWeights,
+        [to_viewer, from_light]: [&[f32]; 2],
+    ) -> f64 {
+        let (viewers, nodes) = (self.mirrored.computed.len(), self.nodes[0].len());
+        let of_viewers = [&weights.viewers[..], &weights.lights];
+        let of_all = [&weights.all_viewers[..], &weights.all_lights];
         let of_ray = |from_light: &[f32]| {
             let of_channel = |(a, b): (&[f32], &[f32])| {
-                let sums = |w: &[f32], all: &[f32]| {
-                    [
-                        f64::from(sum_of_products(a, |at| w[at] * a[at])),
-                        f64::from(sum_of_products(b, |at| all[at] * b[at])),
-                        f64::from(sum_of_products(a, |at| w[at] * b[self.viewers[at]])),
-                    ]
-                };
-                let [[a_v, b_v, ab_v], [a_l, b_l, ab_l]] =
-                    [sums(&weights.viewers, &weights.all_viewers), sums(&weights.lights, &weights.all_lights)];
+                let b_of_viewers: Vec<f32> = self.mirrored.computed.iter().map(|node| b[*node]).collect();
+                let [a_v, a_l] = masked_sum(of_viewers, a, a);
+                let [b_v, b_l] = masked_sum(of_all, b, b);
+                let [ab_v, ab_l] = masked_sum(of_viewers, a, &b_of_viewers);
                 0.25 * (a_v * b_l + a_l * b_v + 2.0 * ab_v * ab_l)
             };
             to_viewer.chunks(viewers).zip(from_light.chunks(nodes)).map(of_channel).sum::<f64>()
@@ -271,6 +325,7 @@ impl<'a> Exchange<'a> {
         let of_number = |ray: usize| {
             let mut from_light = vec![0.0; self.channels * nodes];
             self.walk(ray, &mut from_light);
+            self.reflect(reflection, &mut from_light);
             of_ray(&from_light)
         };
         group.clone().map(of_number).sum()
@@ -401,17 +456,6 @@ fn visible_from(visibility: &Visibility, elements: &[u32], nodes: &[Vec3]) -> Ve
         }
     });
     rows
-}
-
-/// The scalar product of values with others, in lanes.
-fn sum_of_products(values: &[f32], others: impl Fn(usize) -> f32) -> f32 {
-    let mut lanes = [0.0_f32; 8];
-    for (block, values) in values.chunks(8).enumerate() {
-        for (lane, (sum, value)) in lanes.iter_mut().zip(values).enumerate() {
-            *sum += value * others(8 * block + lane);
-        }
-    }
-    lanes.iter().sum()
 }
 
 fn has_no_hue(color: Vec3) -> bool {

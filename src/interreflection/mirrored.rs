@@ -3,6 +3,9 @@
 
 use crate::math::directions::ReducedGrid;
 
+/// Largest number of reflections that map a tile to itself, with the identity.
+pub(super) const MOST_IMAGES: usize = 4;
+
 /// For each node, the node that is computed in its place and the reflection that maps one to the other.
 #[derive(Debug, Clone)]
 pub(super) struct MirroredNodes {
@@ -10,8 +13,8 @@ pub(super) struct MirroredNodes {
     pub computed: Vec<usize>,
     /// Position in `computed`, and the index of the reflection, of each node.
     originals: Vec<(usize, usize)>,
-    /// The image of each node under each reflection.
-    images: Vec<Vec<usize>>,
+    /// The image of each node under each reflection, the identity first.
+    pub images: Vec<Vec<usize>>,
 }
 
 /// Reflections in a plane x = const and in a plane y = const.

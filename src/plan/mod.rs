@@ -99,9 +99,7 @@ impl Plan {
         Self {
             algorithm: context.algorithm,
             try_low_rank: context.try_low_rank,
-            interreflection: context
-                .interreflection
-                .then(|| InterreflectionSettings { mirrors: context.mirrors(), ..settings.interreflection(features) }),
+            interreflection: context.interreflection.then(|| settings.interreflection(features, context.mirrors())),
             bounced: features.bounced,
             mirrors: context.mirrors(),
             try_shading_table: context.try_shading_table,

@@ -307,27 +307,37 @@ impl Settings {
 
     /// The resolution of interreflection. Where it is a small share of the light, fewer rays and a coarser table have a small
     /// error in f̄, unless a lobe is narrower than the steps of the table. There are as many elements for any share, because
-    /// walks read the visibility of the nearest one.
-    pub fn interreflection(&self, features: &SceneFeatures) -> InterreflectionSettings {
+    /// walks read the visibility of the nearest one. Two mirror planes let each ray choose among four images, so that fewer
+    /// rays have the same noise.
+    pub fn interreflection(&self, features: &SceneFeatures, mirrors: [bool; 2]) -> InterreflectionSettings {
         /// Smallest share that is computed with four times the rays and the finer table: what `draft` may leave out.
         const LARGE_SHARE: f64 = 0.35;
-        /// Smallest roughness of lobes in the coarser table.
+        /// Largest share of matte facets for which the coarsest table suffices.
+        const SMALL_SHARE: f64 = 0.2;
+        /// Smallest roughness of lobes in the coarser tables.
         const WIDE_LOBE: f32 = 0.2;
         let (elements, rays, rings) = match self.preset {
-            Preset::Draft => (2048, 600, [8, 8]),
-            Preset::Standard | Preset::Wu2011 => (6144, 1800, [10, 12]),
-            Preset::Fine | Preset::Reference => (16_384, 10_000, [12, 16]),
+            Preset::Draft => (2048, 600, [8, 8, 8]),
+            Preset::Standard | Preset::Wu2011 => (6144, 1800, [8, 10, 12]),
+            Preset::Fine | Preset::Reference => (16_384, 10_000, [12, 12, 16]),
         };
-        let is_large = features.bounced.is_none_or(|bounced| bounced.share >= LARGE_SHARE);
+        let share = features.bounced.map_or(1.0, |bounced| bounced.share);
+        let is_large = share >= LARGE_SHARE;
         let has_narrow_lobe = features.narrowest_lobe < WIDE_LOBE || features.lookups > 0;
+        let table = match features.is_matte() && share < SMALL_SHARE {
+            _ if is_large || has_narrow_lobe => 2,
+            true => 0,
+            false => 1,
+        };
         // The rays of a matte element share what reaches the viewers, so that twice as many cost little.
         let rays = if features.is_matte() { 2 * rays } else { rays };
+        let rays = if mirrors == [true; 2] { 3 * rays / 4 } else { rays };
         InterreflectionSettings {
             elements: self.facets.min(elements),
             useful_rays: if is_large { 4 * rays } else { rays },
             bounces: self.effects.bounces,
-            grid: ReducedGrid::new(rings[usize::from(is_large || has_narrow_lobe)]),
-            mirrors: [false; 2],
+            grid: ReducedGrid::new(rings[table]),
+            mirrors,
         }
     }
 

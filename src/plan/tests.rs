@@ -217,17 +217,21 @@ fn a_small_share_is_computed_with_fewer_rays_and_a_coarser_table_unless_a_lobe_i
     let standard = Settings::of_preset(Preset::Standard);
     let resolution = |share: f64, narrowest_lobe, lookups| {
         let bounced = Some(BouncedShare { share, std_error: 0.0 });
-        let settings = standard.interreflection(&SceneFeatures { bounced, narrowest_lobe, lookups, ..features() });
+        let settings =
+            standard.interreflection(&SceneFeatures { bounced, narrowest_lobe, lookups, ..features() }, [false; 2]);
         (settings.useful_rays, settings.grid.rings)
     };
     for (narrowest_lobe, lookups) in [(0.1, 0), (0.3, 0), (f32::INFINITY, 100)] {
         assert_eq!(resolution(0.36, narrowest_lobe, lookups), (7200, 12));
     }
     assert_eq!([0.1, 0.3].map(|lobe| resolution(0.2, lobe, 0)), [(1800, 12), (1800, 10)]);
-    assert_eq!([0.2, 0.36].map(|share| resolution(share, f32::INFINITY, 0)), [(3600, 10), (14_400, 12)], "matte");
+    let matte = [0.19, 0.2, 0.36].map(|share| resolution(share, f32::INFINITY, 0));
+    assert_eq!(matte, [(3600, 8), (3600, 10), (14_400, 12)]);
     assert_eq!(resolution(0.2, f32::INFINITY, 100), (1800, 12), "a measured lobe may be narrow");
-    let unknown = standard.interreflection(&features());
+    let unknown = standard.interreflection(&features(), [false; 2]);
     assert_eq!((unknown.useful_rays, unknown.grid.rings), (7200, 12));
+    let mirrored = |planes| standard.interreflection(&features(), planes).useful_rays;
+    assert_eq!([[true, false], [true, true]].map(mirrored), [7200, 5400]);
 }
 
 #[test]

@@ -318,6 +318,23 @@ multiversion! {
 
 #[inline(always)]
 fn around<const C: usize, V: Value>(
+    vectors: [Vec3; 2],
+    to: [&[f32]; 3],
+    visibility: &[f32],
+    tints: [[f32; 2]; C],
+    out: &mut [f32],
+    value: impl Fn(f32) -> V,
+) {
+    if tints.iter().all(|[facing, grazing]| facing == grazing) {
+        tinted::<C, false, V>(vectors, to, visibility, tints, out, value);
+    } else {
+        tinted::<C, true, V>(vectors, to, visibility, tints, out, value);
+    }
+}
+
+/// Where no tint `CHANGES`, the compiler leaves out what only tints depend on.
+#[inline(always)]
+fn tinted<const C: usize, const CHANGES: bool, V: Value>(
     [n, away]: [Vec3; 2],
     to: [&[f32]; 3],
     visibility: &[f32],
@@ -342,13 +359,19 @@ fn around<const C: usize, V: Value>(
             let input = lobe_input(&pair, n.x, n.y, n.z);
             let f = value(masking(&pair)).at(input);
             values[l] = if input.is_lit() { f * v[l] } else { 0.0 };
-            let t = (1.0 - i_dot_h).max(0.0);
-            weights[l] = t * t * t * t * t;
+            if CHANGES {
+                let t = (1.0 - i_dot_h).max(0.0);
+                weights[l] = t * t * t * t * t;
+            }
         }
         for (row, [facing, grazing]) in rows.iter_mut().zip(tints) {
-            let end = (start + LANES).min(count);
-            for (l, out) in row[start..end].iter_mut().enumerate() {
-                *out += values[l] * (facing + (grazing - facing) * weights[l]);
+            let add = |l: usize, out: &mut f32| {
+                let tint = if CHANGES { facing + (grazing - facing) * weights[l] } else { facing };
+                *out += values[l] * tint;
+            };
+            match row[start..].first_chunk_mut::<LANES>() {
+                Some(lane) => (0..LANES).for_each(|l| add(l, &mut lane[l])),
+                None => row[start..].iter_mut().enumerate().for_each(|(l, out)| add(l, out)),
             }
         }
     }
