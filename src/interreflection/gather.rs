@@ -7,7 +7,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::mirrored::{MOST_IMAGES, MirroredNodes};
+use super::mirrored::{MOST_IMAGES, MirroredNodes, draw_image};
 use super::sampler::LobeSampler;
 use super::table::NodeWeights;
 use super::transport::{Ray, Vertex, first_density};
@@ -73,6 +73,9 @@ struct Reflector<'a> {
 /// `z`, reached against the direction `ω_z`, adds its weight times `f(z; ω_z, i) / (n·ω_z) V(z, i)`. The steps of a walk
 /// follow the BRDF of each facet ([`LobeSampler`]). A vertex has the visibility of the nearest element.
 ///
+/// If `n` reflections `M` map the tile to itself, `G(o, i)` is computed for one `o` of each set of mirror images. A glossy
+/// ray then adds `f(x; ω, M o) V(x, M o) L(y, M i) / (n p)` for one `M`, drawn with the probability `p`.
+///
 /// # Errors
 /// Returns [`crate::base::Error::Cancelled`] if `cancel` is set.
 pub fn gather(
@@ -104,7 +107,8 @@ pub fn gather(
 
 /// The weights of [`NodeWeights`], for all nodes and for the computed ones, which stand for their mirror images.
 struct ViewerWeights {
-    /// For each reflection, `viewers` at the images of the computed nodes, and zero at all others.
+    /// For each reflection, `viewers` at the images of the computed nodes, and zero at all others. Computed nodes near the
+    /// horizon, which have no weight, have the last one here: their light counts, too.
     of_images: [Vec<f32>; MOST_IMAGES],
     viewers: Vec<f32>,
     lights: Vec<f32>,
@@ -121,14 +125,13 @@ impl ViewerWeights {
         };
         let of_all = |weights: &[f64]| weights.iter().map(|weight| *weight as f32).collect();
         let of_computed_viewers = of_computed(&viewers);
+        let last = of_computed_viewers.iter().copied().rfind(|weight| *weight > 0.0).unwrap_or(1.0);
         let of_image = |reflection: usize| {
             let mut all = vec![0.0; grid.len()];
             if let Some(image) = mirrored.images.get(reflection) {
-                mirrored
-                    .computed
-                    .iter()
-                    .zip(&of_computed_viewers)
-                    .for_each(|(node, weight)| all[image[*node]] = *weight);
+                for (node, weight) in mirrored.computed.iter().zip(&of_computed_viewers) {
+                    all[image[*node]] = if *weight > 0.0 { *weight } else { last };
+                }
             }
             all
         };
@@ -245,8 +248,9 @@ impl<'a> Exchange<'a> {
         groups
     }
 
-    /// Writes what a mirror image of a numbered group of rays sends to each viewer, and what it carries from each light. Returns the
-    /// reflection, which is chosen at random in proportion to what its image sends to all viewers.
+    /// Writes what a mirror image of a numbered group of rays sends to each viewer, and what it carries from each light.
+    /// Returns the index of the reflection. Matte elements stay as they are: all images send nearly as much, and all rays of
+    /// an element would share one image.
     fn fill(&self, (number, group): (usize, &Range<usize>), weights: &ViewerWeights, rows: [&mut [f32]; 2]) -> usize {
         let [to_viewer, from_light] = rows;
         let Ray { element, direction, .. } = self.transport.rays[group.start];
@@ -256,27 +260,14 @@ impl<'a> Exchange<'a> {
         let nodes = self.nodes[0].len();
         let mut to_node = vec![0.0; self.channels * nodes];
         self.add_lobe(element, [normal, away], Vec3::ONE, (&self.nodes, self.visible(element)), &mut to_node);
-        let of_images = weights.of_images.each_ref().map(Vec::as_slice);
-        let mut sent = [0.0; MOST_IMAGES];
-        for values in to_node.chunks(nodes) {
-            sent.iter_mut().zip(masked_sum(of_images, values, values)).for_each(|(sum, of_channel)| *sum += of_channel);
-        }
-        let sent = sent.map(f64::sqrt);
-        let total: f64 = sent.iter().sum();
         to_viewer.fill(0.0);
         from_light.fill(0.0);
-        if total <= 0.0 {
-            return 0;
-        }
-        // Multiples of the golden ratio are even, also among neighbouring groups, which are alike.
-        let mut left = (number as f64 * (0.5 * (5.0_f64.sqrt() - 1.0))).fract() * total;
-        let mut reflection = 0;
-        while reflection + 1 < self.mirrored.images.len() && left >= sent[reflection] {
-            left -= sent[reflection];
-            reflection += 1;
-        }
+        let drawn = match self.materials[element].is_matte {
+            true => Some((0, 1.0)),
+            false => self.drawn_image(number, &to_node, weights),
+        };
+        let Some((reflection, scale)) = drawn else { return 0 };
         let image = &self.mirrored.images[reflection];
-        let scale = (total / (sent[reflection] * self.mirrored.images.len() as f64)) as f32;
         for (to_viewer, to_node) in to_viewer.chunks_mut(self.mirrored.computed.len()).zip(to_node.chunks(nodes)) {
             let of_viewers = to_viewer.iter_mut().zip(&self.mirrored.computed);
             of_viewers.for_each(|(value, node)| *value = scale * to_node[image[*node]]);
@@ -284,6 +275,19 @@ impl<'a> Exchange<'a> {
         group.clone().for_each(|ray| self.walk(ray, from_light));
         self.reflect(reflection, from_light);
         reflection
+    }
+
+    /// The mirror image that stands for a numbered group, which sends `to_node` itself, and its weight.
+    fn drawn_image(&self, number: usize, to_node: &[f32], weights: &ViewerWeights) -> Option<(usize, f32)> {
+        let of_images = weights.of_images.each_ref().map(Vec::as_slice);
+        let mut powers = [0.0; MOST_IMAGES];
+        for values in to_node.chunks(self.nodes[0].len()) {
+            powers.iter_mut().zip(masked_sum(of_images, values, values)).for_each(|(sum, power)| *sum += power);
+        }
+        // Fractional parts of multiples of an irrational number are evenly distributed, also over neighbouring groups,
+        // which are alike. It is not that of `is_examined`, so that the examined groups draw all images.
+        let number = ((number as f64 + 0.5) * std::f64::consts::SQRT_2).fract();
+        draw_image(&powers[..self.mirrored.images.len()], number)
     }
 
     /// Moves the values of all nodes to their images.

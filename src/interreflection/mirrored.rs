@@ -60,6 +60,23 @@ impl MirroredNodes {
     }
 }
 
+/// One of several images, drawn by a number in `[0, 1)` with a probability in proportion to the root of its power, and its
+/// weight: the inverse of the probability over the number of images. `None` if no image has a power.
+pub(super) fn draw_image(powers: &[f64], number: f64) -> Option<(usize, f32)> {
+    let roots = powers.iter().map(|power| power.sqrt());
+    let total: f64 = roots.clone().sum();
+    let mut left = number * total;
+    let mut drawn = None;
+    for (image, root) in roots.enumerate().filter(|(_, root)| *root > 0.0) {
+        drawn = Some((image, (total / (root * powers.len() as f64)) as f32));
+        if left < root {
+            break;
+        }
+        left -= root;
+    }
+    drawn
+}
+
 /// The mirror image of a node.
 fn image(grid: ReducedGrid, node: usize, [x, y]: Reflection) -> usize {
     let (ring, mut azimuth) = grid.ring_and_azimuth(node);
@@ -93,6 +110,23 @@ mod tests {
         let counts =
             [[false; 2], [true, false], [true, true]].map(|planes| MirroredNodes::new(grid, planes).computed.len());
         assert_eq!(counts, [88, 49, 27]);
+    }
+
+    #[test]
+    fn drawn_images_count_each_image_with_a_power_once_in_the_mean() {
+        const NUMBERS: usize = 4000;
+        let powers = [4.0, 0.0, 1.0, 0.25];
+        let mut means = [0.0; 4];
+        for number in 0..NUMBERS {
+            let (image, weight) = draw_image(&powers, (number as f64 + 0.5) / NUMBERS as f64).unwrap();
+            means[image] += 4.0 * f64::from(weight) / NUMBERS as f64;
+        }
+        for (mean, expected) in means.into_iter().zip([1.0, 0.0, 1.0, 1.0]) {
+            assert!((mean - expected).abs() < 2e-3, "{means:?}");
+        }
+        assert_eq!(draw_image(&[1.0, 0.0], 1.0).unwrap().0, 0, "an image without a power is never drawn");
+        assert_eq!(draw_image(&[0.0; 4], 0.5), None);
+        assert_eq!(draw_image(&[9.0], 0.7), Some((0, 1.0)));
     }
 
     #[test]

@@ -40,7 +40,7 @@ pub struct InterreflectionSettings {
     /// Nodes of the table.
     pub grid: ReducedGrid,
     /// Planes x = const and y = const that map the tile to itself. Values that follow from this symmetry are not
-    /// computed.
+    /// summed, and glossy rays have less noise.
     pub mirrors: [bool; 2],
 }
 

@@ -3,7 +3,7 @@
 use super::context::Context;
 use super::effects::{Decision, ROUNDING};
 use super::{Costs, LeftOut, Preset, SceneFeatures, Settings};
-use crate::interreflection::{InterreflectionSettings, MOST_RAYS_PER_USEFUL};
+use crate::interreflection::MOST_RAYS_PER_USEFUL;
 use crate::scene::Switch;
 
 /// A ray from facet to facet, one lobe of it towards one node of the table, and its part of one pair of nodes [ns].
@@ -57,13 +57,14 @@ impl SceneFeatures {
     }
 
     /// Predicted milliseconds of interreflection.
-    fn interreflection_ms(&self, exchange: &InterreflectionSettings, costs: &Costs) -> f64 {
+    fn interreflection_ms(&self, settings: &Settings, costs: &Costs) -> f64 {
+        let exchange = settings.interreflection(self);
         let hidden = self.hidden_directions();
         // A ray meets a facet in this part of the directions, and its own facet sees the sky in the others.
         let useful = (hidden * (1.0 - hidden)).max(1.0 / MOST_RAYS_PER_USEFUL);
         let rays = (exchange.useful_rays as f64 / useful).max(exchange.elements as f64);
         let (walks, nodes) = (rays * hidden, exchange.grid.len() as f64);
-        let halves = exchange.mirrors.map(|plane| if plane { 2.0 } else { 1.0 });
+        let halves = self.mirrors.unwrap_or_default().map(|plane| if plane { 2.0 } else { 1.0 });
         let pairs = nodes * nodes / halves.iter().product::<f64>();
         let per_walk = self.facets_of_walk() * (RAY_NS + nodes * LOBE_NS);
         // The rays of a matte element share what reaches the viewers.
@@ -77,8 +78,8 @@ impl SceneFeatures {
 pub(super) fn decide(context: &Context<'_>, switch: Switch) -> Decision {
     let Context { features, settings, costs, interreflection: on, .. } = *context;
     let tolerance = settings.bounced_tolerance();
-    let exchange = settings.interreflection(features, context.mirrors());
-    let ms = features.interreflection_ms(&exchange, costs);
+    let ms = features.interreflection_ms(settings, costs);
+    let exchange = settings.interreflection(features);
     let means = format!(
         "up to {} bounces of {} rays between {} facets",
         exchange.bounces, exchange.useful_rays, exchange.elements

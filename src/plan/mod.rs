@@ -99,7 +99,9 @@ impl Plan {
         Self {
             algorithm: context.algorithm,
             try_low_rank: context.try_low_rank,
-            interreflection: context.interreflection.then(|| settings.interreflection(features, context.mirrors())),
+            interreflection: context
+                .interreflection
+                .then(|| InterreflectionSettings { mirrors: context.mirrors(), ..settings.interreflection(features) }),
             bounced: features.bounced,
             mirrors: context.mirrors(),
             try_shading_table: context.try_shading_table,

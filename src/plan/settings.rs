@@ -307,12 +307,11 @@ impl Settings {
 
     /// The resolution of interreflection. Where it is a small share of the light, fewer rays and a coarser table have a small
     /// error in f̄, unless a lobe is narrower than the steps of the table. There are as many elements for any share, because
-    /// walks read the visibility of the nearest one. Two mirror planes let each ray choose among four images, so that fewer
-    /// rays have the same noise.
-    pub fn interreflection(&self, features: &SceneFeatures, mirrors: [bool; 2]) -> InterreflectionSettings {
+    /// walks read the visibility of the nearest one.
+    pub fn interreflection(&self, features: &SceneFeatures) -> InterreflectionSettings {
         /// Smallest share that is computed with four times the rays and the finer table: what `draft` may leave out.
         const LARGE_SHARE: f64 = 0.35;
-        /// Largest share of matte facets for which the coarsest table suffices.
+        /// Share of matte facets below which the coarsest table suffices.
         const SMALL_SHARE: f64 = 0.2;
         /// Smallest roughness of lobes in the coarser tables.
         const WIDE_LOBE: f32 = 0.2;
@@ -324,20 +323,22 @@ impl Settings {
         let share = features.bounced.map_or(1.0, |bounced| bounced.share);
         let is_large = share >= LARGE_SHARE;
         let has_narrow_lobe = features.narrowest_lobe < WIDE_LOBE || features.lookups > 0;
-        let table = match features.is_matte() && share < SMALL_SHARE {
-            _ if is_large || has_narrow_lobe => 2,
-            true => 0,
-            false => 1,
+        let [small, middle, large] = rings;
+        let rings = if is_large || has_narrow_lobe {
+            large
+        } else if features.is_matte() && share < SMALL_SHARE {
+            small
+        } else {
+            middle
         };
         // The rays of a matte element share what reaches the viewers, so that twice as many cost little.
         let rays = if features.is_matte() { 2 * rays } else { rays };
-        let rays = if mirrors == [true; 2] { 3 * rays / 4 } else { rays };
         InterreflectionSettings {
             elements: self.facets.min(elements),
             useful_rays: if is_large { 4 * rays } else { rays },
             bounces: self.effects.bounces,
-            grid: ReducedGrid::new(rings[table]),
-            mirrors,
+            grid: ReducedGrid::new(rings),
+            mirrors: [false; 2],
         }
     }
 

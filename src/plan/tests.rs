@@ -217,8 +217,7 @@ fn a_small_share_is_computed_with_fewer_rays_and_a_coarser_table_unless_a_lobe_i
     let standard = Settings::of_preset(Preset::Standard);
     let resolution = |share: f64, narrowest_lobe, lookups| {
         let bounced = Some(BouncedShare { share, std_error: 0.0 });
-        let settings =
-            standard.interreflection(&SceneFeatures { bounced, narrowest_lobe, lookups, ..features() }, [false; 2]);
+        let settings = standard.interreflection(&SceneFeatures { bounced, narrowest_lobe, lookups, ..features() });
         (settings.useful_rays, settings.grid.rings)
     };
     for (narrowest_lobe, lookups) in [(0.1, 0), (0.3, 0), (f32::INFINITY, 100)] {
@@ -228,10 +227,8 @@ fn a_small_share_is_computed_with_fewer_rays_and_a_coarser_table_unless_a_lobe_i
     let matte = [0.19, 0.2, 0.36].map(|share| resolution(share, f32::INFINITY, 0));
     assert_eq!(matte, [(3600, 8), (3600, 10), (14_400, 12)]);
     assert_eq!(resolution(0.2, f32::INFINITY, 100), (1800, 12), "a measured lobe may be narrow");
-    let unknown = standard.interreflection(&features(), [false; 2]);
+    let unknown = standard.interreflection(&features());
     assert_eq!((unknown.useful_rays, unknown.grid.rings), (7200, 12));
-    let mirrored = |planes| standard.interreflection(&features(), planes).useful_rays;
-    assert_eq!([[true, false], [true, true]].map(mirrored), [7200, 5400]);
 }
 
 #[test]

@@ -106,7 +106,7 @@ mod tests {
             });
             after.collect()
         };
-        assert_eq!(levels(&[9.0, 1.0, 6.0, 1.0, 10.0, 40.0]), [0, 1, 2, 2, 2, 1], "a draft leaves less room above it");
+        assert_eq!(levels(&[9.0, 1.0, 6.0, 1.0, 10.0, 40.0]), [0, 1, 2, 2, 2, 1], "9 ms leave no room for `standard`");
         assert_eq!(levels(&[1.0; 9]), [1, 1, 1, 1, 1, 1, 1, 1, 2], "it is tried again after eight");
         assert_eq!(levels(&[40.0]), [1]);
         assert_eq!(levels(&[1.0; 32]), [1; 32], "and then after more");

@@ -131,7 +131,7 @@ multiversion! {
 const WIDTH: usize = 16;
 
 multiversion! {
-    /// `Σ w a b` for each of the weight columns, with an f64 sum over blocks: the visible area of facets that share a
+    /// `Σ w a b` for each of the weight columns, with an f64 sum over blocks, such as the visible area of facets that share a
     /// normal.
     pub fn masked_sum<const C: usize>(weights: [&[f32]; C], a: &[f32], b: &[f32]) -> [f64; C] {
         weights.map(|weights| {
