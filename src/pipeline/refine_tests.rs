@@ -90,7 +90,7 @@ fn a_scene_that_sets_the_resolution_is_not_refined() {
 fn light_between_facets_is_refined_until_its_error_is_within_the_bound() {
     const MIRRORS: [&str; 3] = [
         "tile.geometry={ kind = \"pyramids\", height = 0.5 }",
-        "material.default.brdf={ kind = \"ggx\", roughness = 0.08, f0 = 1 }",
+        "material.default.brdf={ kind = \"ggx\", roughness = 0.06, f0 = 1 }",
         "effects.interreflection=on",
     ];
     let refined = effective(&open("default", "draft", &MIRRORS));
