@@ -9,13 +9,13 @@ use rayon::prelude::*;
 
 use super::mirrored::{MOST_IMAGES, MirroredNodes, draw_image};
 use super::sampler::LobeSampler;
-use super::table::NodeWeights;
 use super::transport::{Ray, Vertex, first_density};
+use super::viewer_weights::ViewerWeights;
 use super::{InterreflectionSettings, InterreflectionTable, Transport};
 use crate::base::{Cancel, Result};
 use crate::brdf::{LobeAngles, Material, Term, analytic_lobe};
 use crate::geometry::{Facets, TileMesh};
-use crate::math::directions::{ReducedGrid, half_vector};
+use crate::math::directions::half_vector;
 use crate::math::linalg::gemm::add_outer_products;
 use crate::math::simd::{Lobe, add_lobes_around, masked_sum};
 use crate::visibility::Visibility;
@@ -105,46 +105,6 @@ pub fn gather(
     Ok(InterreflectionTable::new(settings.grid, &raw, noise, transport.hit_fraction()))
 }
 
-/// The weights of [`NodeWeights`], for all nodes and for the computed ones, which stand for their mirror images.
-struct ViewerWeights {
-    /// For each reflection, `viewers` at the images of the computed nodes, and zero at all others. Computed nodes near the
-    /// horizon, which have no weight, have the last one here: their light counts, too.
-    of_images: [Vec<f32>; MOST_IMAGES],
-    viewers: Vec<f32>,
-    lights: Vec<f32>,
-    all_viewers: Vec<f32>,
-    all_lights: Vec<f32>,
-}
-
-impl ViewerWeights {
-    fn new(grid: ReducedGrid, mirrored: &MirroredNodes) -> Self {
-        let NodeWeights { lights, viewers } = NodeWeights::new(grid);
-        let images = mirrored.image_counts();
-        let of_computed = |weights: &[f64]| -> Vec<f32> {
-            mirrored.computed.iter().zip(&images).map(|(node, images)| weights[*node] as f32 * images).collect()
-        };
-        let of_all = |weights: &[f64]| weights.iter().map(|weight| *weight as f32).collect();
-        let of_computed_viewers = of_computed(&viewers);
-        let last = of_computed_viewers.iter().copied().rfind(|weight| *weight > 0.0).unwrap_or(1.0);
-        let of_image = |reflection: usize| {
-            let mut all = vec![0.0; grid.len()];
-            if let Some(image) = mirrored.images.get(reflection) {
-                for (node, weight) in mirrored.computed.iter().zip(&of_computed_viewers) {
-                    all[image[*node]] = if *weight > 0.0 { *weight } else { last };
-                }
-            }
-            all
-        };
-        Self {
-            of_images: std::array::from_fn(of_image),
-            viewers: of_computed_viewers,
-            lights: of_computed(&lights),
-            all_viewers: of_all(&viewers),
-            all_lights: of_all(&lights),
-        }
-    }
-}
-
 impl<'a> Reflector<'a> {
     fn new((material, sampler): (&'a Material, &'a LobeSampler)) -> Self {
         let is_matte = material.brdf.terms.iter().all(|term| matches!(term, Term::Lambertian { .. }));
@@ -204,9 +164,8 @@ impl<'a> Exchange<'a> {
                 .zip(from_light.par_chunks_mut(channels * nodes))
                 .zip(block)
                 .map(|((to_viewer, from_light), (number, group))| {
-                    let reflection = self.fill((*number, group), weights, [&mut *to_viewer, &mut *from_light]);
-                    is_examined(group, per_examined)
-                        .then(|| self.variance((group, reflection), weights, [to_viewer, from_light]))
+                    self.fill((*number, group), weights, [&mut *to_viewer, &mut *from_light]);
+                    is_examined(group, per_examined).then(|| self.variance(group, weights, [to_viewer, from_light]))
                 })
                 .collect();
             examined += of_groups.iter().flatten().count();
@@ -249,9 +208,8 @@ impl<'a> Exchange<'a> {
     }
 
     /// Writes what a mirror image of a numbered group of rays sends to each viewer, and what it carries from each light.
-    /// Returns the index of the reflection. Matte elements stay as they are: all images send nearly as much, and all rays of
-    /// an element would share one image.
-    fn fill(&self, (number, group): (usize, &Range<usize>), weights: &ViewerWeights, rows: [&mut [f32]; 2]) -> usize {
+    /// Matte elements stay as they are: all images send nearly as much, and all rays of an element would share one image.
+    fn fill(&self, (number, group): (usize, &Range<usize>), weights: &ViewerWeights, rows: [&mut [f32]; 2]) {
         let [to_viewer, from_light] = rows;
         let Ray { element, direction, .. } = self.transport.rays[group.start];
         let element = element as usize;
@@ -262,11 +220,11 @@ impl<'a> Exchange<'a> {
         self.add_lobe(element, [normal, away], Vec3::ONE, (&self.nodes, self.visible(element)), &mut to_node);
         to_viewer.fill(0.0);
         from_light.fill(0.0);
-        let drawn = match self.materials[element].is_matte {
+        let drawn = match self.materials[element].is_matte || self.mirrored.images.len() == 1 {
             true => Some((0, 1.0)),
             false => self.drawn_image(number, &to_node, weights),
         };
-        let Some((reflection, scale)) = drawn else { return 0 };
+        let Some((reflection, scale)) = drawn else { return };
         let image = &self.mirrored.images[reflection];
         for (to_viewer, to_node) in to_viewer.chunks_mut(self.mirrored.computed.len()).zip(to_node.chunks(nodes)) {
             let of_viewers = to_viewer.iter_mut().zip(&self.mirrored.computed);
@@ -274,7 +232,6 @@ impl<'a> Exchange<'a> {
         }
         group.clone().for_each(|ray| self.walk(ray, from_light));
         self.reflect(reflection, from_light);
-        reflection
     }
 
     /// The mirror image that stands for a numbered group, which sends `to_node` itself, and its weight.
@@ -304,12 +261,7 @@ impl<'a> Exchange<'a> {
     /// The part of the weighted variance of all pairs that is due to a group of many independent rays. A ray contributes
     /// `a(o) b(i)`, and the values of swapped pairs are averaged: with `|a|²` and `a·b` weighted as viewers (`v`) or lights
     /// (`l`), `Σ ((a(o) b(i) + a(i) b(o))/2)² = (|a|²_v |b|²_l + |a|²_l |b|²_v + 2 (a·b)_v (a·b)_l)/4`.
-    fn variance(
-        &self,
-        (group, reflection): (&Range<usize>, usize),
-        weights: &ViewerWeights,
-        [to_viewer, from_light]: [&[f32]; 2],
-    ) -> f64 {
+    fn variance(&self, group: &Range<usize>, weights: &ViewerWeights, [to_viewer, from_light]: [&[f32]; 2]) -> f64 {
         let (viewers, nodes) = (self.mirrored.computed.len(), self.nodes[0].len());
         let of_viewers = [&weights.viewers[..], &weights.lights];
         let of_all = [&weights.all_viewers[..], &weights.all_lights];
@@ -329,7 +281,6 @@ impl<'a> Exchange<'a> {
         let of_number = |ray: usize| {
             let mut from_light = vec![0.0; self.channels * nodes];
             self.walk(ray, &mut from_light);
-            self.reflect(reflection, &mut from_light);
             of_ray(&from_light)
         };
         group.clone().map(of_number).sum()

@@ -11,6 +11,7 @@ mod sampler;
 mod share;
 mod table;
 mod transport;
+mod viewer_weights;
 mod walk;
 
 #[cfg(test)]

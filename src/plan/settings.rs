@@ -331,7 +331,7 @@ impl Settings {
         } else {
             middle
         };
-        // The rays of a matte element share what reaches the viewers, so that twice as many cost little.
+        // The rays of a matte element share what reaches the viewers, so that twice as many take less than twice the time.
         let rays = if features.is_matte() { 2 * rays } else { rays };
         InterreflectionSettings {
             elements: self.facets.min(elements),

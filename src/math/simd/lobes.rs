@@ -332,7 +332,7 @@ fn around<const C: usize, V: Value>(
     }
 }
 
-/// Where no tint `CHANGES`, the compiler leaves out what only tints depend on.
+/// The loop of [`around`]. If no tint `CHANGES`, the compiler leaves out the half vectors that only tints need.
 #[inline(always)]
 fn tinted<const C: usize, const CHANGES: bool, V: Value>(
     [n, away]: [Vec3; 2],
