@@ -290,6 +290,11 @@ impl Settings {
         Some(ErrorBound { rel_l2, psnr_db })
     }
 
+    /// The largest relative error of an image where the material is interpolated between points: a tenth of what a table may have.
+    pub fn point_tolerance(&self) -> f32 {
+        if self.preset == Preset::Reference { 0.0 } else { 0.1 * self.image_tolerance.0 as f32 }
+    }
+
     /// The bound to which refinement brings the error; `None` if the settings are not refined.
     pub fn refinement_bound(&self) -> Option<ErrorBound> {
         self.error_bound().filter(|_| self.max_refined_facets.is_some())

@@ -12,6 +12,7 @@ use crate::base::Result;
 use crate::cache::Key;
 use crate::effective::Reflectance;
 use crate::pipeline::{Keyed, Pipeline, StageTimes};
+use crate::plan::Settings;
 use crate::scene::{Camera, LoadedScene};
 
 /// Object, lights, shadows and camera of a scene. Images of several materials share it.
@@ -21,6 +22,8 @@ pub struct RenderScene {
     lights: Keyed<PlacedLights>,
     pub camera: Camera,
     shadow_cache: Option<Arc<Option<ShadowCache>>>,
+    /// The tolerance of [`RenderInput`].
+    tolerance: f32,
 }
 
 impl RenderScene {
@@ -44,7 +47,8 @@ impl RenderScene {
         let environment = pipeline.get(LoadEnvironment::new(loaded, pipeline), times)?;
         let lights = pipeline.get(PlaceLights { loaded, object: &object, environment: &environment }, times)?;
         let camera = loaded.scene.camera.clone().unwrap_or_default();
-        Ok(Self { object, lights, camera, shadow_cache: None })
+        let tolerance = Settings::of(&loaded.scene).point_tolerance();
+        Ok(Self { object, lights, camera, shadow_cache: None, tolerance })
     }
 
     /// Computes the shadow cache. It saves time if several images follow, or if an image has more shading points than
@@ -124,6 +128,7 @@ impl RenderScene {
             reflectance,
             size,
             samples_per_side,
+            tolerance: self.tolerance,
             background,
         }
     }

@@ -295,7 +295,11 @@ fn render_input<'a>(
     background: &'a ImageBackground,
 ) -> RenderInput<'a> {
     let input = scene.input(reflectance, request.size, request.samples_per_side, background);
-    RenderInput { camera: request.camera, ..input }
+    let tolerance = match request.material {
+        ShadedMaterial::Outcome(outcome) => outcome.settings.point_tolerance(),
+        ShadedMaterial::GpuTile(_) => 0.0,
+    };
+    RenderInput { camera: request.camera, tolerance, ..input }
 }
 
 /// A BRDF that returns at once after a cancel, so that rendering ends soon; the image is then discarded.

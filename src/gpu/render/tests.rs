@@ -70,6 +70,7 @@ fn points_and_lifted(
         reflectance: &brdf,
         size,
         samples_per_side: samples,
+        tolerance: 0.0,
         background: &ImageBackground::Wall,
     };
     renderer.render(gpu, &input, &Cancel::default()).unwrap();
@@ -204,6 +205,7 @@ fn an_image_for_a_screen_is_the_tone_mapped_image_that_is_read_back() {
             reflectance: &brdf,
             size,
             samples_per_side: 2,
+            tolerance: 0.0,
             background: &background,
         };
         let tone_map = ToneMap { curve, gain };

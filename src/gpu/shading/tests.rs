@@ -95,6 +95,7 @@ impl TestScene {
             reflectance: brdf,
             size: [side; 2],
             samples_per_side: 1,
+            tolerance: 0.0,
             background,
         }
     }
@@ -110,15 +111,6 @@ fn assert_same(what: &str, gpu: &Gpu, kind: &str, brdf: &EffectiveBrdf) {
     assert_same_image(what, &images);
 }
 
-/// A BRDF whose interreflection the CPU does not interpolate between points.
-struct AtEveryPoint<'a>(&'a EffectiveBrdf);
-
-impl Reflectance for AtEveryPoint<'_> {
-    fn eval_lights(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) {
-        self.0.eval_lights(lights, o, out);
-    }
-}
-
 fn assert_same_shading(what: &str, gpu: &Gpu, kind: &str, brdf: &EffectiveBrdf) {
     let TestScene { mesh, occluder, lights, camera } = TestScene::of(kind);
     let view = CameraView::new(&camera, &mesh, [64, 64]).unwrap();
@@ -126,7 +118,7 @@ fn assert_same_shading(what: &str, gpu: &Gpu, kind: &str, brdf: &EffectiveBrdf) 
     let visible = occluder.as_ref().map(|o| o.visible_lights(&mesh, &points, &lights, view.eye, None));
     let mut shading = GpuShading::new(gpu).unwrap();
     let material = shading.material(gpu, brdf, visible.is_some()).unwrap();
-    let cpu = shading::radiance(&points, &lights, visible.as_ref(), view.eye, &AtEveryPoint(brdf));
+    let cpu = shading::radiance(&points, &lights, visible.as_ref(), &view, brdf, 0.0);
     let gpu_radiance = radiance(gpu, &shading, &material, &points, &lights, visible.as_ref(), view.eye);
     let (_, worst, _) = distances(&cpu, &gpu_radiance);
     eprint!("{what}: shading within {worst:.1e}; ");
@@ -353,6 +345,7 @@ fn facets_of_different_colours_and_an_exchanged_brdf_give_the_same_image() {
         reflectance: &second,
         size: [64, 64],
         samples_per_side: 2,
+        tolerance: 0.0,
         background: &ImageBackground::Wall,
     };
     let gpu_radiance = renderer.render(&gpu, &input, &Cancel::default()).unwrap().image;

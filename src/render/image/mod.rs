@@ -2,6 +2,7 @@
 
 pub mod camera;
 pub mod gbuffer;
+mod interpolated;
 pub mod pixels;
 pub mod raster;
 pub mod render;

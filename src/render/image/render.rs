@@ -30,6 +30,9 @@ pub struct RenderInput<'a> {
     pub size: [usize; 2],
     /// Samples per pixel side; 1 leaves edges aliased.
     pub samples_per_side: usize,
+    /// The largest relative error of a point at which the material is interpolated; 0 evaluates it at every point. On a GPU
+    /// it is evaluated at every point.
+    pub tolerance: f32,
     pub background: &'a ImageBackground,
 }
 
@@ -57,7 +60,7 @@ impl RenderTimes {
 pub struct Rendered {
     pub image: Image,
     pub times: RenderTimes,
-    /// Number of points at which the material was evaluated.
+    /// Number of shading points.
     pub points: usize,
 }
 
@@ -105,8 +108,14 @@ impl VisiblePoints {
     pub fn shade(&self, input: &RenderInput) -> Result<Rendered> {
         let view = CameraView::new(input.camera, input.mesh, input.size)?;
         let start = Instant::now();
-        let radiance =
-            shading::radiance(&self.points, input.lights, self.visibility.as_ref(), view.eye, input.reflectance);
+        let radiance = shading::radiance(
+            &self.points,
+            input.lights,
+            self.visibility.as_ref(),
+            &view,
+            input.reflectance,
+            input.tolerance,
+        );
         let image = shading::gather(&self.points, &radiance, &view, input.background);
         let times = RenderTimes { shading_ms: start.elapsed().as_secs_f64() * 1e3, ..RenderTimes::default() };
         Ok(Rendered { image, times, points: self.points.len() })

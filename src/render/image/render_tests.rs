@@ -48,7 +48,20 @@ fn front() -> scene::Camera {
     scene::Camera { azimuth_deg: 0.0, elevation_deg: 0.0, ..scene::Camera::default() }
 }
 
+/// The tolerance of `standard`.
+const TOLERANCE: f32 = 8e-3;
+
 fn image(
+    mesh: &ObjectMesh,
+    lights: &[DirectionalLight],
+    reflectance: &dyn Reflectance,
+    camera: &scene::Camera,
+) -> Rendered {
+    image_within(TOLERANCE, mesh, lights, reflectance, camera)
+}
+
+fn image_within(
+    tolerance: f32,
     mesh: &ObjectMesh,
     lights: &[DirectionalLight],
     reflectance: &dyn Reflectance,
@@ -64,6 +77,7 @@ fn image(
         reflectance,
         size: [128, 128],
         samples_per_side: 2,
+        tolerance,
         background: &ImageBackground::Uniform(Vec3::ZERO),
     })
     .unwrap()
@@ -175,6 +189,7 @@ fn sizes_that_make_no_image_are_errors() {
             reflectance: &Lambertian,
             size,
             samples_per_side,
+            tolerance: 0.0,
             background: &ImageBackground::Wall,
         };
         assert_eq!(render(&input).unwrap_err().exit_code(), 2);
@@ -212,28 +227,90 @@ impl Reflectance for Bounced {
     }
 }
 
+/// Lights from everywhere above the ground.
+fn many_lights() -> Vec<DirectionalLight> {
+    (0..12)
+        .map(|k| DirectionalLight {
+            direction: crate::math::directions::from_angles(0.12 * k as f32, 2.4 * k as f32),
+            irradiance: Vec3::splat(0.3),
+        })
+        .collect()
+}
+
+/// Relative L2 of the difference of two images, and the largest relative difference of a pixel.
+fn differences(image: &Image, exact: &Image) -> (f64, f32) {
+    let (mut sum, mut error, mut worst) = (0.0, 0.0, 0.0_f32);
+    for (a, b) in image.pixels.iter().zip(&exact.pixels) {
+        sum += f64::from(b.x).powi(2);
+        error += f64::from(a.x - b.x).powi(2);
+        worst = worst.max((a.x - b.x).abs() / b.x.max(0.05));
+    }
+    ((error / sum).sqrt(), worst)
+}
+
 #[test]
 fn bounced_light_between_points_is_that_at_the_points() {
     for kind in ["sphere", "cup", "plate", "teapot"] {
-        let lights: Vec<DirectionalLight> = (0..12)
-            .map(|k| DirectionalLight {
-                direction: crate::math::directions::from_angles(0.12 * k as f32, 2.4 * k as f32),
-                irradiance: Vec3::splat(0.3),
-            })
-            .collect();
-        let mesh = object(kind);
-        let [apart, within] =
-            [true, false].map(|is_apart| image(&mesh, &lights, &Bounced { is_apart }, &scene::Camera::default()).image);
-        let (mut sum, mut error, mut worst) = (0.0, 0.0, 0.0_f32);
-        for (a, b) in apart.pixels.iter().zip(&within.pixels) {
-            sum += f64::from(b.x).powi(2);
-            error += f64::from(a.x - b.x).powi(2);
-            worst = worst.max((a.x - b.x).abs() / b.x.max(0.05));
-        }
-        let rel_l2 = (error / sum).sqrt();
+        let (mesh, lights, camera) = (object(kind), many_lights(), scene::Camera::default());
+        let apart = image(&mesh, &lights, &Bounced { is_apart: true }, &camera).image;
+        let within = image_within(0.0, &mesh, &lights, &Bounced { is_apart: false }, &camera).image;
+        let (rel_l2, worst) = differences(&apart, &within);
         eprintln!("{kind}: relative L2 {rel_l2:.5}, worst {worst:.4}");
         // Here the bounced light is as strong as the direct light; in shipped scenes it has a third of the light at most.
         assert!(rel_l2 < 6e-3 && worst < 0.05, "{kind}: {rel_l2} {worst}");
         assert!(rel_l2 > 0.0, "{kind}: nothing was interpolated");
+    }
+}
+
+/// Counts the points at which a material is evaluated.
+struct Counted<'a> {
+    material: &'a dyn Reflectance,
+    points: std::sync::atomic::AtomicUsize,
+}
+
+impl Reflectance for Counted<'_> {
+    fn eval_lights(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) {
+        self.points.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        self.material.eval_lights(lights, o, out);
+    }
+}
+
+#[test]
+fn images_evaluate_a_material_at_a_part_of_the_points_and_stay_within_their_tolerance() {
+    for kind in ["sphere", "cup", "plate", "teapot"] {
+        for material in
+            [&Brushed { alpha: [0.2, 0.2] } as &dyn Reflectance, &Brushed { alpha: [0.1, 0.35] }, &Lambertian]
+        {
+            let (mesh, lights, camera) = (object(kind), many_lights(), scene::Camera::default());
+            let exact = image_within(0.0, &mesh, &lights, material, &camera);
+            let counted = Counted { material, points: 0.into() };
+            let interpolated = image(&mesh, &lights, &counted, &camera);
+            let part = counted.points.into_inner() as f64 / interpolated.points as f64;
+            let (rel_l2, worst) = differences(&interpolated.image, &exact.image);
+            eprintln!("{kind}: {part:.3} of the points, relative L2 {rel_l2:.5}, worst {worst:.4}");
+            assert!(rel_l2 < f64::from(TOLERANCE) && worst < 0.1, "{kind}: {rel_l2} {worst}");
+            assert!(part < 1.0, "{kind}: every point was evaluated");
+        }
+    }
+}
+
+#[test]
+fn interpolation_keeps_the_edges_of_shadows_and_the_horizons_of_lights() {
+    /// As bright in grazing light as in any other, so that it ends abruptly at the horizon.
+    struct Even;
+    impl Reflectance for Even {
+        fn eval_lights(&self, lights: &[Vec3], _: Vec3, out: &mut [Vec3]) {
+            lights.iter().zip(out).for_each(|(i, out)| *out = if i.z > 0.0 { Vec3::ONE } else { Vec3::ZERO });
+        }
+    }
+    for kind in ["sphere", "cup", "skirt"] {
+        let (mesh, lights, camera) = (object(kind), many_lights(), scene::Camera::default());
+        let counted = Counted { material: &Even, points: 0.into() };
+        let interpolated = image(&mesh, &lights, &counted, &camera);
+        let exact = image_within(0.0, &mesh, &lights, &Even, &camera);
+        let (_, worst) = differences(&interpolated.image, &exact.image);
+        assert!(worst < 1e-5, "{kind}: {worst}");
+        let evaluated = counted.points.into_inner();
+        assert!(evaluated < interpolated.points, "{kind}: {evaluated} of {}", interpolated.points);
     }
 }

@@ -1,8 +1,11 @@
 //! Deferred shading: `Σ_k E_k f̄(i_k, o)` at every shading point, and the average of the points of each pixel.
 
+use std::borrow::Cow;
+
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 
+use super::interpolated;
 use super::shading_points::ShadingPoints;
 use crate::effective::Reflectance;
 use crate::render::shadow::LightVisibility;
@@ -11,114 +14,55 @@ use crate::render::{CameraView, DirectionalLight, Image};
 /// Points per task.
 const CHUNK: usize = 256;
 
-/// Largest number of points over which interreflection is interpolated.
-const RUN: usize = 8;
-/// Bounds the angles between the normals, tangents and views of the ends of such a run: the cosine of 4°. The tables of
-/// interreflection have steps of 5.6° and more.
-const MIN_RUN_COSINE: f32 = 0.997_56;
+/// Which part of the reflected light.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Part {
+    All,
+    /// As [`Reflectance::eval_direct`].
+    Direct,
+    /// As [`Reflectance::eval_bounced`].
+    Bounced,
+}
 
-/// Returns the radiance of each point towards the eye. Without `visibility`, every light is visible.
+/// Returns the radiance of each point towards the eye of the view. Without `visibility`, every light is visible. If
+/// `tolerance` is 0, the material is evaluated at every point. Otherwise it is evaluated at some and interpolated between
+/// them, with about that relative error at most.
 pub fn radiance(
     points: &ShadingPoints,
     lights: &[DirectionalLight],
     visibility: Option<&LightVisibility>,
-    eye: Vec3,
+    view: &CameraView,
     reflectance: &dyn Reflectance,
+    tolerance: f32,
 ) -> Vec<Vec3> {
-    let shading = Shading { points, lights, visibility, eye, reflectance };
-    let mut radiance = vec![Vec3::ZERO; points.len()];
-    radiance.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, radiance)| {
-        let first = chunk * CHUNK;
-        if shading.add_direct(first, radiance) {
-            shading.add_bounced(first, radiance);
-        }
-    });
-    radiance
+    let visibility = match visibility {
+        Some(visibility) => Cow::Borrowed(visibility),
+        None => Cow::Owned(LightVisibility::above_horizon(points, lights)),
+    };
+    let shading = Shading { points, lights, visibility, eye: view.eye, reflectance };
+    if tolerance > 0.0 { interpolated::radiance(&shading, view.size, tolerance) } else { shading.at_every_point() }
 }
 
 /// The inputs of [`radiance`].
-struct Shading<'a> {
-    points: &'a ShadingPoints,
-    lights: &'a [DirectionalLight],
-    visibility: Option<&'a LightVisibility>,
+pub(super) struct Shading<'a> {
+    pub points: &'a ShadingPoints,
+    pub lights: &'a [DirectionalLight],
+    pub visibility: Cow<'a, LightVisibility>,
     eye: Vec3,
     reflectance: &'a dyn Reflectance,
 }
 
 impl Shading<'_> {
-    /// Adds what the points from `first` on reflect directly. Returns true if bounced light is missing.
-    fn add_direct(&self, first: usize, radiance: &mut [Vec3]) -> bool {
-        let (mut directions, mut irradiances) = (Vec::new(), Vec::new());
-        let mut values = vec![Vec3::ZERO; self.lights.len()];
-        let mut is_bounced_missing = false;
-        for (point, radiance) in (first..).zip(radiance) {
-            let frame = self.frame(point);
-            directions.clear();
-            irradiances.clear();
-            for (k, light) in self.lights.iter().enumerate() {
-                if self.is_lit(point, k) {
-                    directions.push(frame.transpose() * light.direction);
-                    irradiances.push(light.irradiance);
-                }
+    fn at_every_point(&self) -> Vec<Vec3> {
+        let mut radiance = vec![Vec3::ZERO; self.points.len()];
+        radiance.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, radiance)| {
+            let mut evaluator = Evaluator::new(self);
+            for (point, radiance) in (chunk * CHUNK..).zip(radiance) {
+                evaluator.eval(Part::All, point, |k| self.visibility.is_lit(point, k));
+                *radiance = evaluator.terms().map(|(_, value)| value).sum();
             }
-            if directions.is_empty() {
-                continue;
-            }
-            let values = &mut values[..directions.len()];
-            is_bounced_missing |= self.reflectance.eval_direct(&directions, self.view(point, frame), values);
-            *radiance = values.iter().zip(&irradiances).map(|(f, e)| *f * *e).sum();
-        }
-        is_bounced_missing
-    }
-
-    /// Adds interreflection. It is evaluated at the ends of runs of similar points, and interpolated between them.
-    fn add_bounced(&self, first: usize, radiance: &mut [Vec3]) {
-        let end = first + radiance.len();
-        let mut directions = Vec::with_capacity(self.lights.len());
-        let mut values = [(); 2].map(|()| vec![Vec3::ZERO; self.lights.len()]);
-        let mut eval = |point: usize, values: &mut Vec<Vec3>| {
-            let frame = self.frame(point);
-            directions.clear();
-            directions.extend(self.lights.iter().map(|light| frame.transpose() * light.direction));
-            self.reflectance.eval_bounced(&directions, self.view(point, frame), values);
-        };
-        let [at_start, at_last] = &mut values;
-        let (mut start, mut is_known) = (first, false);
-        while start < end {
-            if !is_known {
-                eval(start, at_start);
-            }
-            let longest = (start + 1..end.min(start + RUN + 1)).take_while(|point| self.is_similar(start, *point));
-            let last = longest.last().unwrap_or(start);
-            is_known = last > start;
-            if is_known {
-                eval(last, at_last);
-            }
-            // The last point begins the next run.
-            for point in start..last.max(start + 1) {
-                let t = (point - start) as f32 / (last - start).max(1) as f32;
-                let lit = (0..self.lights.len()).filter(|k| self.is_lit(point, *k));
-                radiance[point - first] +=
-                    lit.map(|k| at_start[k].lerp(at_last[k], t) * self.lights[k].irradiance).sum::<Vec3>();
-            }
-            std::mem::swap(at_start, at_last);
-            start = last.max(start + 1);
-        }
-    }
-
-    fn is_similar(&self, a: usize, b: usize) -> bool {
-        let points = self.points;
-        let towards_eye = |point: usize| (self.eye - points.positions[point]).normalize_or_zero();
-        points.pixels[b] - points.pixels[a] <= RUN as u32
-            && points.normals[a].dot(points.normals[b]) >= MIN_RUN_COSINE
-            && points.tangents[a].dot(points.tangents[b]) >= MIN_RUN_COSINE
-            && towards_eye(a).dot(towards_eye(b)) >= MIN_RUN_COSINE
-    }
-
-    /// Returns whether a light reaches a point, on the side of its normal.
-    fn is_lit(&self, point: usize, light: usize) -> bool {
-        self.visibility.is_none_or(|visibility| visibility.is_lit(point, light))
-            && self.lights[light].direction.dot(self.points.normals[point]) > 0.0
+        });
+        radiance
     }
 
     /// The axes of the tangent frame.
@@ -131,6 +75,45 @@ impl Shading<'_> {
     fn view(&self, point: usize, frame: Mat3) -> Vec3 {
         let to_eye = (self.eye - self.points.positions[point]).try_normalize().unwrap_or(frame.z_axis);
         frame.transpose() * to_eye
+    }
+}
+
+/// Evaluates the material at points. It keeps its buffers.
+pub(super) struct Evaluator<'a> {
+    shading: &'a Shading<'a>,
+    sources: Vec<usize>,
+    directions: Vec<Vec3>,
+    values: Vec<Vec3>,
+}
+
+impl<'a> Evaluator<'a> {
+    pub fn new(shading: &'a Shading<'a>) -> Self {
+        Self { shading, sources: Vec::new(), directions: Vec::new(), values: vec![Vec3::ZERO; shading.lights.len()] }
+    }
+
+    /// Evaluates a part of the light of the sources that count. Returns true if bounced light is missing in it.
+    pub fn eval(&mut self, part: Part, point: usize, counts: impl Fn(usize) -> bool) -> bool {
+        let (lights, reflectance) = (self.shading.lights, self.shading.reflectance);
+        let frame = self.shading.frame(point);
+        self.sources.clear();
+        self.sources.extend((0..lights.len()).filter(|k| counts(*k)));
+        if self.sources.is_empty() {
+            return false;
+        }
+        self.directions.clear();
+        self.directions.extend(self.sources.iter().map(|k| frame.transpose() * lights[*k].direction));
+        let (view, values) = (self.shading.view(point, frame), &mut self.values[..self.sources.len()]);
+        match part {
+            Part::All => reflectance.eval_lights(&self.directions, view, values),
+            Part::Direct => return reflectance.eval_direct(&self.directions, view, values),
+            Part::Bounced => reflectance.eval_bounced(&self.directions, view, values),
+        }
+        false
+    }
+
+    /// The sources of the last call of [`Evaluator::eval`], and the radiance that each causes.
+    pub fn terms(&self) -> impl Iterator<Item = (usize, Vec3)> {
+        self.sources.iter().zip(&self.values).map(|(k, value)| (*k, *value * self.shading.lights[*k].irradiance))
     }
 }
 

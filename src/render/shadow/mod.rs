@@ -71,6 +71,23 @@ impl LightVisibility {
         Self { words_per_point, words: vec![0; points * words_per_point] }
     }
 
+    /// The lights that are on the side of each point's normal.
+    pub fn above_horizon(points: &ShadingPoints, lights: &[DirectionalLight]) -> Self {
+        let mut visible = Self::none(points.len(), lights.len());
+        visible.words.par_chunks_mut(visible.words_per_point).zip(&points.normals).for_each(|(bits, normal)| {
+            for (k, light) in lights.iter().enumerate() {
+                bits[k / 32] |= u32::from(light.direction.dot(*normal) > 0.0) << (k % 32);
+            }
+        });
+        visible
+    }
+
+    /// Returns true if the same lights are visible from two points.
+    pub fn is_same(&self, a: usize, b: usize) -> bool {
+        let [a, b] = [a, b].map(|point| &self.words[point * self.words_per_point..][..self.words_per_point]);
+        a == b
+    }
+
     pub fn words_per_point(&self) -> usize {
         self.words_per_point
     }

@@ -120,6 +120,7 @@ fn tiles_are_visible_up_close_and_the_image_keeps_its_brightness() {
             reflectance: &*brdf,
             size: [240, 240],
             samples_per_side: 1,
+            tolerance: 0.0,
             background: &ImageBackground::default(),
         };
         let far = render(&input).unwrap().image;
