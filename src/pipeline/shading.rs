@@ -244,29 +244,31 @@ impl Shading {
             }
             _ => 0,
         };
-        let mut nodes = Nodes { mirrors, ..Nodes::all(grid) };
+        let nodes = Nodes { mirrors, ..Nodes::all(grid) };
         let count = grid.originals(mirrors);
         if count > MIN_TRIAL_NODES {
-            let mut trial = |facets: Option<usize>| -> Result<Option<Errors>> {
-                let trial = self.tabulate(Nodes { facets, read_by: Some(&check.pairs), ..nodes }, cancel, times)?;
-                Ok(trial.map(|trial| check.errors(&self.with_table(trial))))
-            };
             // If the fewest facets are enough, nothing else is tried. If all are not, the grid is too coarse.
             let mut order: Vec<_> = SUBSETS.into_iter().filter(|part| 2 * part <= facets).map(Some).collect();
             order.insert(order.len().min(1), None);
             let mut enough = None;
-            for part in order {
-                let Some(errors) = trial(part)? else { return Ok(Attempt::Impossible) };
-                match (part, self.is_close(errors)) {
-                    (Some(_), true) => {
-                        enough = part;
+            for facets in order {
+                let part = Nodes { facets, ..nodes };
+                let trial = self.tabulate(Nodes { read_by: Some(&check.pairs), ..part }, cancel, times)?;
+                let Some(trial) = trial else { return Ok(Attempt::Impossible) };
+                let errors = check.errors(&self.with_table(trial.clone()));
+                if self.is_close(errors) {
+                    enough = Some((part, trial));
+                    if facets.is_some() {
                         break;
                     }
-                    (None, false) => return Ok(Attempt::TooFar(errors)),
-                    _ => {}
+                } else if facets.is_none() {
+                    return Ok(Attempt::TooFar(errors));
                 }
             }
-            nodes.facets = enough;
+            if let Some((part, trial)) = enough {
+                let rest = Nodes { known: Some((&check.pairs, &trial)), ..part };
+                return Ok(self.tabulate(rest, cancel, times)?.map_or(Attempt::Impossible, Attempt::Table));
+            }
         } else if facets > 0 && COARSE_TABLE_NODES.contains(&count) {
             let part = Nodes { facets: Some(facets / COARSE_SUBSET_DIVISOR), ..nodes };
             let Some(table) = self.tabulate(part, cancel, times)? else { return Ok(Attempt::Impossible) };

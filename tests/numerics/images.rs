@@ -69,27 +69,32 @@ fn a_table_has_the_values_of_the_sum_at_its_nodes() {
 }
 
 #[test]
-fn a_table_built_for_some_pairs_has_the_values_of_the_whole_table_there() {
+fn a_table_built_for_some_pairs_has_the_values_of_the_whole_table_there_and_can_be_completed() {
     let outcome = Pipeline::new().effective(&draft("table4_skirt")).unwrap();
     let Representation::Direct(direct) = &outcome.brdf.representation else { panic!("not a sum") };
     let grid = HemispherePairGrid { rings: 7, azimuths: 12, phi_d: 6, theta_d: 5 };
     let pairs = image_pairs(20, 99);
+    let build = |nodes| ShadingTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap();
+    let black = |table: &ShadingTable| table.values().iter().filter(|value| **value == glam::Vec4::ZERO).count();
+    let brdf = |table: &ShadingTable| EffectiveBrdf {
+        representation: Representation::Table(table.clone()),
+        base_area: outcome.brdf.base_area,
+    };
     for mirrors in [[false; 2], [true, false], [true; 2]] {
         for facets in [None, Some(direct.sum.facet_count() / 5)] {
-            let tabulated = |read_by| {
-                let nodes = Nodes { mirrors, facets, read_by, ..Nodes::all(grid) };
-                let table = ShadingTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap();
-                let black = table.values().iter().filter(|value| **value == glam::Vec4::ZERO).count();
-                (
-                    EffectiveBrdf { representation: Representation::Table(table), base_area: outcome.brdf.base_area },
-                    black,
-                )
-            };
-            let ((whole, none), (some, black)) = (tabulated(None), tabulated(Some(&pairs[..])));
-            assert!(black > none, "{mirrors:?}: no node is left out");
+            let nodes = Nodes { mirrors, facets, ..Nodes::all(grid) };
+            let (whole, some) = (build(nodes), build(Nodes { read_by: Some(&pairs[..]), ..nodes }));
+            assert!(black(&some) > black(&whole), "{mirrors:?}: no node is left out");
+            let [of_whole, of_some] = [&whole, &some].map(brdf);
             for pair in &pairs {
-                assert_eq!(whole.eval(pair.i, pair.o), some.eval(pair.i, pair.o), "{mirrors:?} {pair:?}");
+                assert_eq!(of_whole.eval(pair.i, pair.o), of_some.eval(pair.i, pair.o), "{mirrors:?} {pair:?}");
             }
+            let completed = build(Nodes { known: Some((&pairs[..], &some)), ..nodes });
+            assert!(completed.values() == whole.values(), "{mirrors:?} {facets:?}");
+            // The known nodes are not computed again: those of a table without light stay black.
+            let dark = build(Nodes { read_by: Some(&[]), ..nodes });
+            let completed = build(Nodes { known: Some((&pairs[..], &dark)), ..nodes });
+            assert!(black(&completed) > black(&whole), "{mirrors:?} {facets:?}");
         }
     }
 }

@@ -57,12 +57,14 @@ pub struct Nodes<'a> {
     pub facets: Option<usize>,
     /// Pairs that the table will be evaluated at; nodes that they do not read stay zero. `None` computes all nodes.
     pub read_by: Option<&'a [Pair]>,
+    /// Pairs, and a table of the nodes that they read. These nodes are taken from it; all else must be equal.
+    pub known: Option<(&'a [Pair], &'a ShadingTable)>,
 }
 
 impl Nodes<'_> {
     /// Computes every node from all facets.
     pub fn all(grid: HemispherePairGrid) -> Self {
-        Self { grid, mirrors: [false; 2], facets: None, read_by: None }
+        Self { grid, mirrors: [false; 2], facets: None, read_by: None, known: None }
     }
 }
 
@@ -157,7 +159,7 @@ impl ShadingTable {
     /// Fills a table. `prepare` receives each half vector, `fill` writes the columns of a pair about it, and `area`
     /// returns `a_v(o)`.
     fn tabulate<P>(
-        Nodes { grid, mirrors, read_by, .. }: Nodes,
+        Nodes { grid, mirrors, read_by, known, .. }: Nodes,
         weights: Vec<Weight>,
         is_of_sum: bool,
         area: impl Fn(Vec3) -> f64 + Sync,
@@ -166,11 +168,17 @@ impl ShadingTable {
         fill: impl Fn(&P, Vec3, Vec3, &mut [f32]) + Sync,
     ) -> Result<Self> {
         let (vec4s, stored) = (weights.len().div_ceil(4), grid.theta_d + 2);
-        let mut values = vec![Vec4::ZERO; grid.half_vectors() * grid.phi_d * stored * vec4s];
+        let mut values = match known {
+            Some((_, table)) => table.values.to_vec(),
+            None => vec![Vec4::ZERO; grid.half_vectors() * grid.phi_d * stored * vec4s],
+        };
         let (row_len, half_vector_len) = (stored * vec4s, grid.phi_d * stored * vec4s);
         let images: Vec<(usize, bool)> = (0..grid.azimuths).map(|azimuth| grid.image(azimuth, mirrors)).collect();
         let read = read_by.map(|pairs| nodes_read(&grid, &images, pairs));
-        let is_read = |node: usize| read.as_ref().is_none_or(|read| read[node]);
+        let known = known.map(|(pairs, _)| nodes_read(&grid, &images, pairs));
+        let is_read = |node: usize| {
+            read.as_ref().is_none_or(|read| read[node]) && !known.as_ref().is_some_and(|known| known[node])
+        };
         let half_vectors = values.par_chunks_mut(half_vector_len).enumerate();
         half_vectors.try_for_each(|(half_vector, nodes)| {
             cancel.check()?;

@@ -127,7 +127,10 @@ impl ReducedGrid {
         let at = turns * count as f32;
         let second = at as usize;
         let weights = cubic_weights(at - second as f32).map(|of| weight * of);
-        RingTaps { ring, first: (second + count - 1) % count, weights }
+        // Less than three turns; a division would take longer than the rest.
+        let first = second + count - 1;
+        let first = if first >= 2 * count { first - 2 * count } else { first };
+        RingTaps { ring, first: if first >= count { first - count } else { first }, weights }
     }
 
     /// Four taps as nodes.
