@@ -15,6 +15,7 @@ mod errors;
 mod factored;
 #[path = "../../tests/hard_tiles/mod.rs"]
 mod hard_tiles;
+mod image_points;
 mod in_tests;
 mod interpolation;
 mod interreflection;
@@ -81,6 +82,7 @@ const MEASUREMENTS: &[(&str, &str, Source)] = &[
         "invariants of every hard case with every evaluator: half an hour",
         Source::Test(InTests { binary: &["--test", "hard_cases"], test: "the_table_of_all_cases_and_evaluators" }),
     ),
+    ("image-points", "errors and times of images interpolated between points", Source::Here(image_points)),
     ("interpolation", "errors of low-rank factors by interpolation alone", Source::Here(interpolation)),
     (
         "interreflection",
@@ -195,6 +197,11 @@ fn capture_sheet(sheet: Option<&str>, table: &mut Table) -> Result<(), String> {
 
 fn slabs(_: Option<&str>, table: &mut Table) -> Result<(), String> {
     slabs::slabs(&mut |line| table.line(line));
+    Ok(())
+}
+
+fn image_points(_: Option<&str>, table: &mut Table) -> Result<(), String> {
+    image_points::image_points(&mut |line| table.line(line));
     Ok(())
 }
 

@@ -11,7 +11,7 @@ use crate::pipeline::SlabOutcome;
 use crate::render::image::shading::ImageBackground;
 use crate::render::image::tone_map::ToneMap;
 use crate::render::render;
-use crate::render::{Image, RenderScene};
+use crate::render::{Image, RenderInput, RenderScene};
 use crate::scene::LoadedScene;
 use crate::slab::Slab;
 use anyhow::Result;
@@ -160,7 +160,9 @@ fn side_by_side(render_scene: &RenderScene, materials: &[&dyn Reflectance], size
     let background = ImageBackground::Uniform(Vec3::ZERO);
     let mut images = Vec::new();
     for &reflectance in materials {
-        images.push(render(&render_scene.input(reflectance, size, 2, &background))?.image);
+        // Differences must be those of the materials.
+        let input = RenderInput { tolerance: 0.0, ..render_scene.input(reflectance, size, 2, &background) };
+        images.push(render(&input)?.image);
     }
     let [width, height] = size;
     let mut sheet = Image {

@@ -70,7 +70,8 @@ impl Pipeline {
         }
         // A clustered sum is exact between the nodes of a table as well.
         let wants_table = plan.try_shading_table && !is_clustered_tile;
-        let grid = settings.image_grids.last().copied().filter(|_| wants_table);
+        // Nothing checks this table, so that it is finer than the first one of a CPU.
+        let grid = settings.image_grids.iter().take(2).next_back().copied().filter(|_| wants_table);
         let visibility_input = self.gpu_visibility(&inputs, grid.is_some(), &mut times)?;
         let is_large = grid.is_some_and(|grid| grid.nodes() > MIRRORS_FROM);
         let mirrors = if is_large && settings.effects.mirror_symmetry != Switch::Off {

@@ -265,10 +265,9 @@ impl Shading {
                     return Ok(Attempt::TooFar(errors));
                 }
             }
-            if let Some((part, trial)) = enough {
-                let rest = Nodes { known: Some((&check.pairs, &trial)), ..part };
-                return Ok(self.tabulate(rest, cancel, times)?.map_or(Attempt::Impossible, Attempt::Table));
-            }
+            let Some((part, trial)) = enough else { return Ok(Attempt::Impossible) };
+            let rest = Nodes { known: Some((&check.pairs, &trial)), ..part };
+            return Ok(self.tabulate(rest, cancel, times)?.map_or(Attempt::Impossible, Attempt::Table));
         } else if facets > 0 && COARSE_TABLE_NODES.contains(&count) {
             let part = Nodes { facets: Some(facets / COARSE_SUBSET_DIVISOR), ..nodes };
             let Some(table) = self.tabulate(part, cancel, times)? else { return Ok(Attempt::Impossible) };

@@ -220,7 +220,11 @@ impl Settings {
             keep_color: 0.999,
             tolerance: 0.04,
             tolerance_db: 41.0,
-            image_grids: vec![hemisphere_pair_grid(16, 32, 12, 12), hemisphere_pair_grid(20, 40, 16, 16)],
+            image_grids: vec![
+                hemisphere_pair_grid(16, 32, 12, 12),
+                hemisphere_pair_grid(20, 40, 16, 16),
+                hemisphere_pair_grid(24, 48, 16, 20),
+            ],
             image_tolerance: (0.08, 38.0),
             reference_facets: 16_384,
             reference_passes: 32,
@@ -290,7 +294,7 @@ impl Settings {
         Some(ErrorBound { rel_l2, psnr_db })
     }
 
-    /// The largest relative error of an image where the material is interpolated between points: a tenth of what a table may have.
+    /// The relative error of an image where the material is interpolated between points: a tenth of what a table may have.
     pub fn point_tolerance(&self) -> f32 {
         if self.preset == Preset::Reference { 0.0 } else { 0.1 * self.image_tolerance.0 as f32 }
     }

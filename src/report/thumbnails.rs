@@ -10,7 +10,7 @@ use crate::reference::Reference;
 use crate::render::image::shading::ImageBackground;
 use crate::render::image::tone_map::{ToneMap, srgb_byte};
 use crate::render::render;
-use crate::render::{Image, RenderScene};
+use crate::render::{Image, RenderInput, RenderScene};
 use crate::scene::LoadedScene;
 
 /// Pixels per side.
@@ -38,7 +38,10 @@ impl ThumbnailRenderer {
     /// # Errors
     /// Returns an error if the camera cannot frame the object.
     pub fn image(&self, material: &dyn Reflectance) -> Result<Image> {
-        Ok(render(&self.render_scene.input(material, [SIZE, SIZE], 1, &ImageBackground::default()))?.image)
+        // Differences of these images are measured, and a noisy reference must not be interpolated.
+        let background = ImageBackground::default();
+        let input = self.render_scene.input(material, [SIZE, SIZE], 1, &background);
+        Ok(render(&RenderInput { tolerance: 0.0, ..input })?.image)
     }
 
     /// The image as a PNG in a `data:` URL.

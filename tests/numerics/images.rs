@@ -47,6 +47,15 @@ fn shading_brdfs_of_the_papers_five_scenes_reach_28_db_on_pairs_that_their_check
 }
 
 #[test]
+fn images_of_a_weave_that_two_coarser_tables_do_not_serve_read_a_third() {
+    let loaded = open("table4_skirt", &["tile.geometry.warp_width=0.6", "quality.backend=cpu"]);
+    let outcome = Pipeline::new().effective(&loaded).unwrap();
+    let read = outcome.shading_brdf(&Cancel::default()).unwrap();
+    let Representation::Table(table) = &read.brdf.representation else { panic!("{:?}", read.errors) };
+    assert_eq!(Some(&table.grid), outcome.settings.image_grids.last());
+}
+
+#[test]
 fn a_table_has_the_values_of_the_sum_at_its_nodes() {
     let outcome = Pipeline::new().effective(&draft("table4_plate")).unwrap();
     let Representation::Direct(direct) = &outcome.brdf.representation else { panic!("not a sum") };

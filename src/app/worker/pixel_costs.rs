@@ -38,15 +38,15 @@ impl Shading {
 /// Milliseconds per pixel of the last images.
 #[derive(Debug)]
 pub struct PixelCosts {
-    /// Of each [`Shading`].
-    shading: [f64; 3],
+    /// Of each [`Shading`], for one and for four samples. With four, most of the time goes to edges.
+    shading: [[Option<f64>; 2]; 3],
     /// To find the point that a pixel shows and the lights that reach it, for one and for four samples.
     points: [f64; 2],
 }
 
 impl Default for PixelCosts {
     fn default() -> Self {
-        Self { shading: [FIRST_SHADING; 3], points: [FIRST_POINT; 2] }
+        Self { shading: [[None; 2]; 3], points: [FIRST_POINT; 2] }
     }
 }
 
@@ -54,16 +54,19 @@ impl PixelCosts {
     /// Records the times of an image.
     pub fn record(&mut self, shading: Shading, samples_per_side: usize, size: [usize; 2], times: &RenderTimes) {
         let pixels = (size[0] * size[1]) as f64;
-        self.shading[shading as usize] = times.shading_ms / pixels;
+        let samples = usize::from(samples_per_side > 1);
+        self.shading[shading as usize][samples] = Some(times.shading_ms / pixels);
         if times.gbuffer_ms > 0.0 {
-            self.points[usize::from(samples_per_side > 1)] = (times.gbuffer_ms + times.shadows_ms) / pixels;
+            self.points[samples] = (times.gbuffer_ms + times.shadows_ms) / pixels;
         }
     }
 
     /// The estimated times of an image [ms]: of its shading, and of its points, unless they are known.
     pub fn of_image(&self, size: [usize; 2], shading: Shading, samples_per_side: usize) -> [f64; 2] {
         let pixels = (size[0] * size[1]) as f64;
-        [self.shading[shading as usize], self.points[samples_per_side - 1]].map(|cost| pixels * cost)
+        let [one, four] = self.shading[shading as usize];
+        let known = if samples_per_side > 1 { four.or(one) } else { one.or(four) };
+        [known.unwrap_or(FIRST_SHADING), self.points[samples_per_side - 1]].map(|cost| pixels * cost)
     }
 
     /// The largest size with the aspect ratio of `full` that is estimated to take at most `budget_ms`. `known` returns the
@@ -117,5 +120,9 @@ mod tests {
         assert_eq!(size(1e-3, KnownPoints::All), [50, 25], "the smallest, however long it takes");
         let refined = costs.affordable([400, 200], Shading::Refined, 100.0, |_, _| KnownPoints::None);
         assert!(refined[0] < 200, "the refined BRDF was not measured yet: {refined:?}");
+        // Four samples cost what one does until they are measured; later, neither changes the other.
+        assert_eq!(costs.of_image([100, 100], Shading::Draft, 2)[0], 10.0);
+        costs.record(Shading::Draft, 2, [100, 100], &RenderTimes { shading_ms: 50.0, ..RenderTimes::default() });
+        assert_eq!([1, 2].map(|samples| costs.of_image([100, 100], Shading::Draft, samples)[0]), [10.0, 50.0]);
     }
 }

@@ -21,7 +21,7 @@ pub struct TableContent {
 const MAX_WORDS: usize = 1 << 28;
 
 impl Nodes<'_> {
-    /// Hashes the grid and everything that selects and computes its nodes.
+    /// Hashes the grid and everything that selects and computes its nodes. Known nodes change no value.
     pub(crate) fn hash_into(&self, key: &mut KeyBuilder) {
         let HemispherePairGrid { rings, azimuths, phi_d, theta_d } = self.grid;
         key.counts("grid", [rings, azimuths, phi_d, theta_d]).flags("mirrors", self.mirrors);

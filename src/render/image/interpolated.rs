@@ -1,7 +1,8 @@
 //! Radiance that is computed at the corners of squares of pixels, and interpolated inside them where that is close enough.
 //!
 //! What is interpolated is the light of each source without shadows, because it varies slowly. Shadows keep the resolution
-//! of the image. A square whose middle differs from the mean of its corners is divided, down to single pixels.
+//! of the image. Where the light between the corners of a square is off in its middle or in the middle of a side, the square is
+//! divided, down to single pixels. Where it is close, these five points are corners of four quarters, which are interpolated.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -9,19 +10,26 @@ use rayon::prelude::*;
 use super::shading::{Evaluator, Part, Shading};
 
 /// Pixels per side of the block that one task shades.
-const BLOCK: usize = 32;
+const BLOCK: usize = 16;
 /// A row of a block, and the first pixel of the next block, which is a corner of squares of this one.
 const STRIDE: usize = BLOCK + 1;
 /// Pixels per side of the largest squares.
 const LARGEST: usize = 8;
-/// Bounds the angles of normals and tangents to those in the middle of a square: the cosine of 4°. The tables of
-/// interreflection have steps of 5.6° and more.
+/// Those of the smallest ones whose quarters are interpolated.
+const SMALLEST: usize = 4;
+/// Bounds the angles of normals and tangents to those in the middle of a square: the cosine of 4°.
 const MIN_COSINE: f32 = 0.997_56;
+/// Bounds them between points of a pixel that share light that facets send to each other: the cosine of 3°. The tables of this
+/// light have steps of 5.6° and more.
+const MIN_SHARED_COSINE: f32 = 0.998_63;
+/// Times the tolerance: the error allowed in a square whose quarters are interpolated, where it is at most half as large, and
+/// that of light that facets send to each other, which is a part of all light.
+const CHECK_FACTOR: f32 = 2.0;
+const BOUNCED_FACTOR: f32 = 6.0;
 /// Stands for no point, and for no values.
 const NONE: u32 = u32::MAX;
 
-/// The radiance of each point of an image of this size. In the middle of each square, direct light differs by at most
-/// `tolerance` times itself. Light that facets send to each other is smooth enough to be interpolated without a check.
+/// The radiance of each point of an image of this size. `tolerance` is the relative error that is aimed at.
 pub(super) fn radiance(shading: &Shading, [width, height]: [usize; 2], tolerance: f32) -> Vec<Vec3> {
     let pixels = &shading.points.pixels;
     let rows: Vec<usize> = (0..=height).map(|row| pixels.partition_point(|p| (*p as usize) < row * width)).collect();
@@ -43,7 +51,7 @@ pub(super) fn radiance(shading: &Shading, [width, height]: [usize; 2], tolerance
     radiance
 }
 
-/// The points of a block of pixels. `points`, `known` and `exact` have one entry per pixel, in rows of [`STRIDE`].
+/// A block of pixels, its points and their light. `points` and `known` have one entry per pixel, in rows of [`STRIDE`].
 struct Block<'a> {
     shading: &'a Shading<'a>,
     evaluator: Evaluator<'a>,
@@ -57,8 +65,6 @@ struct Block<'a> {
     /// Light of each source without shadows. A pixel at which a source without a value counts is not interpolated, because
     /// light can end abruptly at the horizon.
     values: Vec<Option<Vec3>>,
-    /// The light of the sources that reach a pixel, if it was computed.
-    exact: Vec<Option<Vec3>>,
     is_bounced_missing: bool,
     /// Points and parts of their radiance.
     out: Vec<(u32, Vec3)>,
@@ -93,7 +99,6 @@ impl<'a> Block<'a> {
             edges,
             known: Vec::new(),
             values: Vec::new(),
-            exact: Vec::new(),
             is_bounced_missing: false,
             out: Vec::new(),
         }
@@ -103,12 +108,14 @@ impl<'a> Block<'a> {
     fn add(&mut self, part: Part) -> bool {
         self.known = vec![NONE; STRIDE * STRIDE];
         self.values.clear();
-        self.exact = vec![None; STRIDE * STRIDE];
         self.is_bounced_missing = false;
+        let mut last: Option<(u32, Vec3)> = None;
         for k in 0..self.edges.len() {
             let point = self.edges[k];
-            let value = self.lit(part, point);
-            self.out.push((point, value));
+            let shared = last.filter(|(last, _)| part == Part::Bounced && self.are_alike(*last, point));
+            let (from, light) = shared.unwrap_or_else(|| (point, self.lit(part, point)));
+            last = Some((from, light));
+            self.out.push((point, light));
         }
         for y in (0..BLOCK).step_by(LARGEST) {
             for x in (0..BLOCK).step_by(LARGEST) {
@@ -118,12 +125,21 @@ impl<'a> Block<'a> {
         self.is_bounced_missing
     }
 
+    /// Returns true if two points of a pixel are on one smooth surface and in the same light.
+    fn are_alike(&self, a: u32, b: u32) -> bool {
+        let (a, b, points) = (a as usize, b as usize, self.shading.points);
+        points.pixels[a] == points.pixels[b]
+            && points.normals[a].dot(points.normals[b]) >= MIN_SHARED_COSINE
+            && points.tangents[a].dot(points.tangents[b]) >= MIN_SHARED_COSINE
+            && self.shading.visibility.is_same(a, b)
+    }
+
     fn add_square(&mut self, part: Part, first: usize, side: usize) {
         if side == 1 {
             let point = self.points[first];
             if point != NONE {
-                let value = self.at(part, first);
-                self.out.push((point, value));
+                let light = self.at(part, first);
+                self.out.push((point, light));
             }
             return;
         }
@@ -131,50 +147,51 @@ impl<'a> Block<'a> {
         if rows.flat_map(|row| &self.points[row..row + side]).all(|point| *point == NONE) {
             return;
         }
-        if !self.interpolate(part, first, side) {
-            let half = side / 2;
-            for quarter in [first, first + half, first + half * STRIDE, first + half * STRIDE + half] {
-                self.add_square(part, quarter, half);
-            }
+        let begin = self.out.len();
+        if !self.is_close(part, first, side)
+            || !quarters(first, side).iter().all(|quarter| self.fill(part, *quarter, side / 2))
+        {
+            self.out.truncate(begin);
+            quarters(first, side).iter().for_each(|quarter| self.add_square(part, *quarter, side / 2));
         }
     }
 
-    /// Interpolates between the corners of a square. Returns false, and adds nothing, if that is not close enough.
-    fn interpolate(&mut self, part: Part, first: usize, side: usize) -> bool {
-        if !self.is_smooth(first, side) {
+    /// Returns true if a square is smooth, and the light between its corners is close to that in its middle and in the middles
+    /// of its sides. All of them are then known with all sources, so that its quarters can be interpolated.
+    fn is_close(&mut self, part: Part, first: usize, side: usize) -> bool {
+        if side < SMALLEST || !self.is_smooth(first, side) {
             return false;
         }
-        let corners = [first, first + side, first + side * STRIDE, first + side * STRIDE + side];
-        let corners = corners.map(|pixel| self.values_of(part, pixel));
-        let sums_at = |block: &Self, point: u32| -> Option<[Vec3; 4]> {
-            let [a, b, c, d] = corners.map(|values| block.sum(values, point));
-            Some([a?, b?, c?, d?])
-        };
-        let middle = first + side / 2 * STRIDE + side / 2;
-        if part == Part::Direct {
-            let Some(sums) = sums_at(self, self.points[middle]) else { return false };
-            let exact = self.at(part, middle);
-            let error = (sums.iter().sum::<Vec3>() * 0.25 - exact).abs().max_element();
-            if error > self.tolerance * exact.max_element() {
-                return false;
-            }
-        }
-        let begin = self.out.len();
+        let (corners, half) = (self.corners(part, first, side), side / 2);
+        [[half, half], [half, 0], [0, half], [side, half], [half, side]].into_iter().all(|[x, y]| {
+            let pixel = first + y * STRIDE + x;
+            self.values_of(part, pixel);
+            let Some(sums) = self.sums(corners, self.points[pixel]) else { return false };
+            let light = self.at(part, pixel);
+            let tolerance = self.tolerance * if part == Part::Bounced { BOUNCED_FACTOR } else { CHECK_FACTOR };
+            let allowed = tolerance * light.max_element();
+            (between(sums, [x, y], side) - light).abs().cmple(Vec3::splat(allowed)).all()
+        })
+    }
+
+    /// Interpolates between the corners of a square. Returns false where a source is below the horizon of a corner.
+    fn fill(&mut self, part: Part, first: usize, side: usize) -> bool {
+        let corners = self.corners(part, first, side);
         let mut last: Option<(u32, [Vec3; 4])> = None;
-        for y in 0..side {
-            for x in 0..side {
-                let point = self.points[first + y * STRIDE + x];
-                let known = last.filter(|(last, _)| self.shading.visibility.is_same(*last as usize, point as usize));
-                let Some(sums) = known.map(|(_, sums)| sums).or_else(|| sums_at(self, point)) else {
-                    self.out.truncate(begin);
-                    return false;
-                };
-                last = Some((point, sums));
-                let [s, t] = [x, y].map(|step| step as f32 / side as f32);
-                self.out.push((point, sums[0].lerp(sums[1], s).lerp(sums[2].lerp(sums[3], s), t)));
-            }
+        for [x, y] in (0..side * side).map(|k| [k % side, k / side]) {
+            let point = self.points[first + y * STRIDE + x];
+            let known = last.filter(|(last, _)| self.shading.visibility.is_same(*last as usize, point as usize));
+            let Some(sums) = known.map(|(_, sums)| sums).or_else(|| self.sums(corners, point)) else { return false };
+            last = Some((point, sums));
+            self.out.push((point, between(sums, [x, y], side)));
         }
         true
+    }
+
+    /// Where the values of the corners of a square begin.
+    fn corners(&mut self, part: Part, first: usize, side: usize) -> [usize; 4] {
+        let far = first + side * STRIDE;
+        [first, first + side, far, far + side].map(|pixel| self.values_of(part, pixel))
     }
 
     /// Returns true if each pixel of a square and of its far sides has one point, with similar normals and tangents.
@@ -200,20 +217,17 @@ impl<'a> Block<'a> {
         lit.map(|(_, value)| *value).sum()
     }
 
-    /// The light of a pixel. Only pixels with even coordinates can be corners, so that only they need all sources.
+    /// The same from the values of four corners.
+    fn sums(&self, corners: [usize; 4], point: u32) -> Option<[Vec3; 4]> {
+        let [a, b, c, d] = corners.map(|values| self.sum(values, point));
+        Some([a?, b?, c?, d?])
+    }
+
+    /// The light of a pixel.
     fn at(&mut self, part: Part, pixel: usize) -> Vec3 {
-        if let Some(known) = self.exact[pixel] {
-            return known;
-        }
-        let (x, y, point) = (pixel % STRIDE, pixel / STRIDE, self.points[pixel]);
-        let light = if x % 2 == 0 && y % 2 == 0 {
-            let values = self.values_of(part, pixel);
-            self.sum(values, point).unwrap_or_default()
-        } else {
-            self.lit(part, point)
-        };
-        self.exact[pixel] = Some(light);
-        light
+        let (known, point) = (self.known[pixel], self.points[pixel]);
+        let sum = if known == NONE { None } else { self.sum(known as usize, point) };
+        sum.unwrap_or_else(|| self.lit(part, point))
     }
 
     /// The light of the sources that reach a point.
@@ -239,4 +253,16 @@ impl<'a> Block<'a> {
         }
         self.known[pixel] as usize
     }
+}
+
+/// The first pixels of the quarters of a square.
+fn quarters(first: usize, side: usize) -> [usize; 4] {
+    let half = side / 2;
+    [first, first + half, first + half * STRIDE, first + half * STRIDE + half]
+}
+
+/// Interpolates linearly between the corners of a square.
+fn between([a, b, c, d]: [Vec3; 4], at: [usize; 2], side: usize) -> Vec3 {
+    let [s, t] = at.map(|step| step as f32 / side as f32);
+    a.lerp(b, s).lerp(c.lerp(d, s), t)
 }

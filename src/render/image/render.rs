@@ -12,8 +12,8 @@ use crate::render::shadow::{LightVisibility, Occluder};
 use crate::render::{CameraView, DirectionalLight, Image, ObjectMesh};
 use crate::scene;
 
-/// Bounds the samples (pixels times samples per pixel) of one image; a shading point takes 48 bytes, and most pixels need
-/// one.
+/// Bounds the samples (pixels times samples per pixel) of one image; a shading point takes 48 bytes, up to 64 more
+/// while it is shaded, and most pixels need one.
 pub const MAX_SAMPLES: usize = 1 << 25;
 
 /// Everything that an image depends on.
@@ -30,8 +30,7 @@ pub struct RenderInput<'a> {
     pub size: [usize; 2],
     /// Samples per pixel side; 1 leaves edges aliased.
     pub samples_per_side: usize,
-    /// The largest relative error of a point at which the material is interpolated; 0 evaluates it at every point. On a GPU
-    /// it is evaluated at every point.
+    /// The relative error of points at which the material is interpolated; 0 evaluates it at every point, as a GPU always does.
     pub tolerance: f32,
     pub background: &'a ImageBackground,
 }

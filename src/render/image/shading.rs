@@ -26,7 +26,7 @@ pub(super) enum Part {
 
 /// Returns the radiance of each point towards the eye of the view. Without `visibility`, every light is visible. If
 /// `tolerance` is 0, the material is evaluated at every point. Otherwise it is evaluated at some and interpolated between
-/// them, with about that relative error at most.
+/// them, with about that relative error.
 pub fn radiance(
     points: &ShadingPoints,
     lights: &[DirectionalLight],

@@ -1,4 +1,4 @@
-//! The points at which the material is evaluated: one per pixel in smooth regions, one per sample at edges.
+//! The points of an image that are shaded: one per pixel in smooth regions, one per sample at edges.
 
 use glam::Vec3;
 
