@@ -19,13 +19,15 @@ const LARGEST: usize = 8;
 const SMALLEST: usize = 4;
 /// Bounds the angles of normals and tangents to those in the middle of a square: the cosine of 4°.
 const MIN_COSINE: f32 = 0.997_56;
+/// Cosine of the angle between a normal and the lowest source that another corner of the square may see: 8° below the horizon.
+const LOWEST: f32 = -0.139_2;
 /// Bounds them between points of a pixel that share light that facets send to each other: the cosine of 3°. The tables of this
 /// light have steps of 5.6° and more.
 const MIN_SHARED_COSINE: f32 = 0.998_63;
 /// Times the tolerance: the error allowed in a square whose quarters are interpolated, where it is at most half as large, and
 /// that of light that facets send to each other, which is a part of all light.
 const CHECK_FACTOR: f32 = 2.0;
-const BOUNCED_FACTOR: f32 = 6.0;
+const BOUNCED_FACTOR: f32 = 20.0;
 /// Stands for no point, and for no values.
 const NONE: u32 = u32::MAX;
 
@@ -62,8 +64,8 @@ struct Block<'a> {
     edges: Vec<u32>,
     /// Where a pixel's part of `values` begins.
     known: Vec<u32>,
-    /// Light of each source without shadows. A pixel at which a source without a value counts is not interpolated, because
-    /// light can end abruptly at the horizon.
+    /// Light of each source without shadows, which can end abruptly at the horizon. Sources little below it have the light of the
+    /// horizon, so that pixels that see them are interpolated; lower ones have none.
     values: Vec<Option<Vec3>>,
     is_bounced_missing: bool,
     /// Points and parts of their radiance.
@@ -174,7 +176,7 @@ impl<'a> Block<'a> {
         })
     }
 
-    /// Interpolates between the corners of a square. Returns false where a source is below the horizon of a corner.
+    /// Interpolates between the corners of a square. Returns false where a source has no light at a corner.
     fn fill(&mut self, part: Part, first: usize, side: usize) -> bool {
         let corners = self.corners(part, first, side);
         let mut last: Option<(u32, [Vec3; 4])> = None;
@@ -242,10 +244,9 @@ impl<'a> Block<'a> {
         if self.known[pixel] == NONE {
             let (point, lights, first) = (self.points[pixel] as usize, self.shading.lights, self.values.len());
             let normal = self.shading.points.normals[point];
-            self.is_bounced_missing |= self.evaluator.eval(part, point, |k| lights[k].direction.dot(normal) > 0.0);
-            // Light that facets send to each other is faint near the horizon, so that it may be interpolated towards none.
-            let below_horizon = (part == Part::Bounced).then_some(Vec3::ZERO);
-            self.values.resize(first + lights.len(), below_horizon);
+            let is_near = |k: usize| lights[k].direction.dot(normal) > LOWEST;
+            self.is_bounced_missing |= self.evaluator.eval(part, point, is_near);
+            self.values.resize(first + lights.len(), None);
             for (k, value) in self.evaluator.terms() {
                 self.values[first + k] = Some(value);
             }

@@ -91,7 +91,8 @@ impl<'a> Evaluator<'a> {
         Self { shading, sources: Vec::new(), directions: Vec::new(), values: vec![Vec3::ZERO; shading.lights.len()] }
     }
 
-    /// Evaluates a part of the light of the sources that count. Returns true if bounced light is missing in it.
+    /// Evaluates a part of the light of the sources that count; those below the horizon are lifted to it. Returns true if bounced
+    /// light is missing in it.
     pub fn eval(&mut self, part: Part, point: usize, counts: impl Fn(usize) -> bool) -> bool {
         let (lights, reflectance) = (self.shading.lights, self.shading.reflectance);
         let frame = self.shading.frame(point);
@@ -101,7 +102,7 @@ impl<'a> Evaluator<'a> {
             return false;
         }
         self.directions.clear();
-        self.directions.extend(self.sources.iter().map(|k| frame.transpose() * lights[*k].direction));
+        self.directions.extend(self.sources.iter().map(|k| lifted(frame.transpose() * lights[*k].direction)));
         let (view, values) = (self.shading.view(point, frame), &mut self.values[..self.sources.len()]);
         match part {
             Part::All => reflectance.eval_lights(&self.directions, view, values),
@@ -115,6 +116,12 @@ impl<'a> Evaluator<'a> {
     pub fn terms(&self) -> impl Iterator<Item = (usize, Vec3)> {
         self.sources.iter().zip(&self.values).map(|(k, value)| (*k, *value * self.shading.lights[*k].irradiance))
     }
+}
+
+/// A direction, or the nearest one above the horizon.
+fn lifted(direction: Vec3) -> Vec3 {
+    const LOWEST: f32 = 1e-4;
+    if direction.z >= LOWEST { direction } else { direction.with_z(LOWEST).normalize_or(Vec3::Z) }
 }
 
 /// The background of an image.
