@@ -51,7 +51,7 @@ fn images_of_a_weave_that_two_coarser_tables_do_not_serve_read_a_third() {
     let loaded = open("table4_skirt", &["tile.geometry.warp_width=0.6", "quality.backend=cpu"]);
     let outcome = Pipeline::new().effective(&loaded).unwrap();
     let read = outcome.shading_brdf(&Cancel::default()).unwrap();
-    let Representation::Table(table) = &read.brdf.representation else { panic!("{:?}", read.errors) };
+    let Representation::Table(table) = read.brdf.direct_representation() else { panic!("{:?}", read.errors) };
     assert_eq!(Some(&table.grid), outcome.settings.image_grids.last());
 }
 
