@@ -1,7 +1,7 @@
 //! Radiance that is computed at the corners of squares of pixels, and interpolated inside them where that is close enough.
 //!
-//! What is interpolated is the light of each source without shadows, because it varies slowly. Shadows keep the resolution
-//! of the image. Where the light between the corners of a square is off in its middle or in the middle of a side, the square is
+//! The light of each source is interpolated without shadows, because it varies slowly then. Shadows keep the resolution of
+//! the image. Where the light between the corners of a square is off in its middle or in the middle of a side, the square is
 //! divided, down to single pixels. Where it is close, these five points are corners of four quarters, which are interpolated.
 
 use glam::Vec3;
@@ -19,14 +19,14 @@ const LARGEST: usize = 8;
 const SMALLEST: usize = 4;
 /// Bounds the angles of normals and tangents to those in the middle of a square: the cosine of 4°.
 const MIN_COSINE: f32 = 0.997_56;
-/// Cosine of the angle between a normal and the lowest source that another corner of the square may see: 8° below the horizon.
-const LOWEST: f32 = -0.139_2;
-/// Bounds them between points of a pixel that share light that facets send to each other: the cosine of 3°. The tables of this
-/// light have steps of 5.6° and more.
+/// Bounds the angles between the points of a pixel that share light that facets send to each other: the cosine of 3°. The
+/// tables of this light have steps of 5.6° and more.
 const MIN_SHARED_COSINE: f32 = 0.998_63;
-/// Times the tolerance: the error allowed in a square whose quarters are interpolated, where it is at most half as large, and
-/// that of light that facets send to each other, which is a part of all light.
+/// Cosine of the angle between a normal and the lowest source that another pixel of the square may see: 8° below the horizon.
+const LOWEST_COSINE: f32 = -0.139_2;
+/// The error allowed in a square, as a multiple of the tolerance. Its quarters have smaller errors.
 const CHECK_FACTOR: f32 = 2.0;
+/// The same of light that facets send to each other, which is a part of all light.
 const BOUNCED_FACTOR: f32 = 20.0;
 /// Stands for no point, and for no values.
 const NONE: u32 = u32::MAX;
@@ -136,6 +136,7 @@ impl<'a> Block<'a> {
             && self.shading.visibility.is_same(a, b)
     }
 
+    /// Adds the light of a square, interpolated if that is close enough, else that of its quarters.
     fn add_square(&mut self, part: Part, first: usize, side: usize) {
         if side == 1 {
             let point = self.points[first];
@@ -244,7 +245,7 @@ impl<'a> Block<'a> {
         if self.known[pixel] == NONE {
             let (point, lights, first) = (self.points[pixel] as usize, self.shading.lights, self.values.len());
             let normal = self.shading.points.normals[point];
-            let is_near = |k: usize| lights[k].direction.dot(normal) > LOWEST;
+            let is_near = |k: usize| lights[k].direction.dot(normal) > LOWEST_COSINE;
             self.is_bounced_missing |= self.evaluator.eval(part, point, is_near);
             self.values.resize(first + lights.len(), None);
             for (k, value) in self.evaluator.terms() {

@@ -53,6 +53,7 @@ pub(super) struct Shading<'a> {
 }
 
 impl Shading<'_> {
+    /// The simple version: the radiance of each point, from the material there.
     fn at_every_point(&self) -> Vec<Vec3> {
         let mut radiance = vec![Vec3::ZERO; self.points.len()];
         radiance.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, radiance)| {
@@ -120,8 +121,8 @@ impl<'a> Evaluator<'a> {
 
 /// A direction, or the nearest one above the horizon.
 fn lifted(direction: Vec3) -> Vec3 {
-    const LOWEST: f32 = 1e-4;
-    if direction.z >= LOWEST { direction } else { direction.with_z(LOWEST).normalize_or(Vec3::Z) }
+    const MIN_Z: f32 = 1e-4;
+    if direction.z >= MIN_Z { direction } else { direction.with_z(MIN_Z).normalize_or(Vec3::Z) }
 }
 
 /// The background of an image.
