@@ -119,10 +119,10 @@ impl<'a> Evaluator<'a> {
     }
 }
 
-/// A direction, or the nearest one above the horizon.
+/// A direction above the horizon as it is; others are lifted to little above it.
 fn lifted(direction: Vec3) -> Vec3 {
     const MIN_Z: f32 = 1e-4;
-    if direction.z >= MIN_Z { direction } else { direction.with_z(MIN_Z).normalize_or(Vec3::Z) }
+    if direction.z > 0.0 { direction } else { direction.with_z(MIN_Z).normalize_or(Vec3::Z) }
 }
 
 /// The background of an image.
