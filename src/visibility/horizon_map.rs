@@ -219,8 +219,10 @@ impl HorizonMap {
 
     /// The horizon map of some of the facets, in the given order.
     pub fn subset(&self, facets: &[usize]) -> Self {
-        let rows = (0..self.azimuths).map(|azimuth| self.row(azimuth));
-        let slopes = rows.flat_map(|row| facets.iter().map(|&facet| row[facet])).collect();
+        let mut slopes = Vec::with_capacity(self.azimuths * facets.len());
+        for row in (0..self.azimuths).map(|azimuth| self.row(azimuth)) {
+            slopes.extend(facets.iter().map(|&facet| row[facet]));
+        }
         Self { facets: facets.len(), slopes, ..*self }
     }
 

@@ -53,23 +53,21 @@ impl Overhangs {
 
     /// The intervals of some of the facets: `new_indices` holds each facet's new index, or [`NOT_IN_SUBSET`].
     fn subset(&self, new_indices: &[u32]) -> Self {
-        let count = self.facets.len();
-        let (mut facets, mut columns) = (vec![0; count], [(); 3].map(|()| vec![0.0; count]));
-        let mut written = 0;
-        // Each interval is written; the next one overwrites it if its facet is not in the subset. A branch would be
-        // unpredictable and cost more.
-        for k in 0..count {
-            let new_index = new_indices[self.facets[k] as usize];
-            facets[written] = new_index;
-            for (column, from) in columns.iter_mut().zip([&self.low, &self.high, &self.switch]) {
-                column[written] = from[k];
-            }
-            written += usize::from(new_index != NOT_IN_SUBSET);
+        let (mut kept, mut count) = (vec![0; self.facets.len()], 0);
+        // Each index is written; the next one overwrites it if its facet is not in the subset. A branch would be unpredictable
+        // and cost more.
+        for (k, facet) in self.facets.iter().enumerate() {
+            kept[count] = k as u32;
+            count += usize::from(new_indices[*facet as usize] != NOT_IN_SUBSET);
         }
-        facets.truncate(written);
-        columns.iter_mut().for_each(|column| column.truncate(written));
-        let [low, high, switch] = columns;
-        Self { facets, low, high, switch }
+        kept.truncate(count);
+        let column = |values: &[f32]| kept.iter().map(|k| values[*k as usize]).collect();
+        Self {
+            facets: kept.iter().map(|k| new_indices[self.facets[*k as usize] as usize]).collect(),
+            low: column(&self.low),
+            high: column(&self.high),
+            switch: column(&self.switch),
+        }
     }
 
     fn iter(&self) -> impl Iterator<Item = (u32, f32, f32)> {

@@ -192,14 +192,23 @@ impl ShadingTable {
             let (i, o) = grid.pair(first);
             let prepared = prepare(directions::half_vector(i, o));
             let mut sums = vec![0.0; 4 * vec4s];
+            // At θ_d = 0 both directions of a pair are the half vector, whatever φ_d is.
+            let mut along_half_vector: Option<Vec<f32>> = None;
             for (phi_d, row) in nodes.chunks_mut(row_len).enumerate() {
                 for step in 0..grid.theta_d {
                     let node = first + phi_d * grid.theta_d + step;
                     if !is_read(node) {
                         continue;
                     }
-                    let (i, o) = grid.pair(node);
-                    fill(&prepared, i, o, &mut sums[..weights.len()]);
+                    if let Some(known) = along_half_vector.as_ref().filter(|_| step == 0) {
+                        sums.copy_from_slice(known);
+                    } else {
+                        let (i, o) = grid.pair(node);
+                        fill(&prepared, i, o, &mut sums[..weights.len()]);
+                    }
+                    if step == 0 {
+                        along_half_vector.get_or_insert_with(|| sums.clone());
+                    }
                     for (node, sums) in row[(step + 1) * vec4s..].iter_mut().zip(sums.as_chunks::<4>().0) {
                         *node = Vec4::from_array(*sums);
                     }
