@@ -27,8 +27,8 @@ const EXAMINED: usize = 1024;
 const MOST_PER_EXAMINED: usize = 8;
 /// Variance of the stratified rays relative to independent ones, on many tiles.
 const STRATIFIED: f64 = 0.6;
-/// Elements whose visibility is transposed at once.
-const TRANSPOSED: usize = 16;
+/// Elements whose visibility is computed at once.
+const TOGETHER: usize = 64;
 /// Lower limit of the cosine that a lobe is divided by. It bounds the contribution of rays along their own surface.
 const MIN_COSINE: f32 = 1e-3;
 /// Walks whose weight is below this are continued at random, with a weight of this.
@@ -163,8 +163,8 @@ impl<'a> Exchange<'a> {
                 .par_chunks_mut(channels * viewers)
                 .zip(from_light.par_chunks_mut(channels * nodes))
                 .zip(block)
-                .map(|((to_viewer, from_light), (number, group))| {
-                    self.fill((*number, group), weights, [&mut *to_viewer, &mut *from_light]);
+                .map_init(Vec::new, |to_node, ((to_viewer, from_light), (number, group))| {
+                    self.fill((*number, group), weights, to_node, [&mut *to_viewer, &mut *from_light]);
                     is_examined(group, per_examined).then(|| self.variance(group, weights, [to_viewer, from_light]))
                 })
                 .collect();
@@ -209,22 +209,28 @@ impl<'a> Exchange<'a> {
 
     /// Writes what a mirror image of a numbered group of rays sends to each viewer, and what it carries from each light.
     /// Matte elements stay as they are: all images send nearly as much, and all rays of an element would share one image.
-    fn fill(&self, (number, group): (usize, &Range<usize>), weights: &ViewerWeights, rows: [&mut [f32]; 2]) {
-        let [to_viewer, from_light] = rows;
+    /// `to_node` is a buffer.
+    fn fill(
+        &self,
+        (number, group): (usize, &Range<usize>),
+        weights: &ViewerWeights,
+        to_node: &mut Vec<f32>,
+        [to_viewer, from_light]: [&mut [f32]; 2],
+    ) {
         let Ray { element, direction, .. } = self.transport.rays[group.start];
         let element = element as usize;
         let normal = self.facets.normals[self.transport.facets[element] as usize];
         let away = if self.materials[element].is_matte { normal } else { direction };
         let nodes = self.nodes[0].len();
-        let mut to_node = vec![0.0; self.channels * nodes];
-        self.add_lobe(element, [normal, away], Vec3::ONE, (&self.nodes, self.visible(element)), &mut to_node);
-        to_viewer.fill(0.0);
+        to_node.clear();
+        to_node.resize(self.channels * nodes, 0.0);
+        self.add_lobe(element, [normal, away], Vec3::ONE, (&self.nodes, self.visible(element)), to_node);
         from_light.fill(0.0);
         let drawn = match self.materials[element].is_matte || self.mirrored.images.len() == 1 {
             true => Some((0, 1.0)),
-            false => self.drawn_image(number, &to_node, weights),
+            false => self.drawn_image(number, to_node, weights),
         };
-        let Some((reflection, scale)) = drawn else { return };
+        let Some((reflection, scale)) = drawn else { return to_viewer.fill(0.0) };
         let image = &self.mirrored.images[reflection];
         for (to_viewer, to_node) in to_viewer.chunks_mut(self.mirrored.computed.len()).zip(to_node.chunks(nodes)) {
             let of_viewers = to_viewer.iter_mut().zip(&self.mirrored.computed);
@@ -394,20 +400,20 @@ fn is_examined(group: &Range<usize>, of: usize) -> bool {
 fn visible_from(visibility: &Visibility, elements: &[u32], nodes: &[Vec3]) -> Vec<f32> {
     let chosen: Vec<usize> = elements.iter().map(|s| *s as usize).collect();
     let subset = visibility.subset(&chosen);
-    let column = |node: Vec3| {
-        let visibility = subset.as_ref().unwrap_or(visibility);
-        let mut all = vec![0.0; visibility.facets()];
-        visibility.fill(node, 0..visibility.facets(), &mut all);
+    let fill = |node: Vec3, range: Range<usize>, out: &mut [f32]| match &subset {
+        Some(subset) => subset.fill(node, range, out),
         // Bit maps have no subset.
-        if subset.is_some() { all } else { chosen.iter().map(|s| all[*s]).collect() }
+        None => chosen[range].iter().zip(out.chunks_mut(1)).for_each(|(s, out)| visibility.fill(node, *s..s + 1, out)),
     };
-    let columns: Vec<Vec<f32>> = nodes.par_iter().map(|node| column(*node)).collect();
     let mut rows = vec![0.0; elements.len() * nodes.len()];
-    // Some elements at once, so that each part of a column is read from memory once.
-    rows.par_chunks_mut(TRANSPOSED * nodes.len()).enumerate().for_each(|(block, rows)| {
-        for (node, column) in columns.iter().enumerate() {
-            let values = &column[block * TRANSPOSED..];
-            rows[node..].iter_mut().step_by(nodes.len()).zip(values).for_each(|(to, value)| *to = *value);
+    let blocks = rows.par_chunks_mut(TOGETHER * nodes.len()).enumerate();
+    blocks.for_each_init(Vec::new, |values, (block, rows)| {
+        let first = block * TOGETHER;
+        let count = rows.len() / nodes.len();
+        values.resize(count, 0.0);
+        for (k, node) in nodes.iter().enumerate() {
+            fill(*node, first..first + count, values);
+            rows[k..].iter_mut().step_by(nodes.len()).zip(&*values).for_each(|(to, value)| *to = *value);
         }
     });
     rows

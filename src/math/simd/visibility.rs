@@ -134,8 +134,9 @@ multiversion! {
     /// `Σ w a b` for each of the weight columns, with an f64 sum over blocks, such as the visible area of facets that share a
     /// normal.
     pub fn masked_sum<const C: usize>(weights: [&[f32]; C], a: &[f32], b: &[f32]) -> [f64; C] {
-        weights.map(|weights| {
-            let mut sum = 0.0;
+        let mut sums = [0.0; C];
+        // A loop, because the closure of a map would not be compiled for the instructions of this version.
+        for (sum, weights) in sums.iter_mut().zip(weights) {
             for ((w, a), b) in weights.chunks(BLOCK).zip(a.chunks(BLOCK)).zip(b.chunks(BLOCK)) {
                 let mut lanes = [0.0_f32; WIDTH];
                 let (w_head, w_tail) = w.as_chunks::<WIDTH>();
@@ -149,10 +150,10 @@ multiversion! {
                 for (((lane, w), a), b) in lanes.iter_mut().zip(w_tail).zip(a_tail).zip(b_tail) {
                     *lane += w * (a * b);
                 }
-                sum += total(&lanes);
+                *sum += total(&lanes);
             }
-            sum
-        })
+        }
+        sums
     }
 }
 
