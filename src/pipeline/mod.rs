@@ -177,10 +177,19 @@ impl Pipeline {
     ) -> Result<Keyed<Facets>> {
         // The facet of a level tile has the mean colour of the tile. Bins lose the interpolated normals.
         let keeps_places = !tile.flat && (settings.normal_bins.is_none() || tile.mesh.corner_normals.is_none());
-        let Some(below) = tile.below.as_ref().filter(|_| keeps_places) else {
-            return self.get(SampleFacets { tile, settings, role }, times);
-        };
-        let facets = &self.get(SampleFacets { tile: below, settings, role }, times)?;
+        let below = tile.below.as_ref().filter(|_| keeps_places);
+        let placed = below.unwrap_or(tile);
+        let mut grid = None;
+        if SampleFacets::needs_grid(placed, settings) {
+            let cells = self.get(BuildCells { tile: placed }, times)?.value;
+            self.get(BuildHierarchy { tile: placed, grid: &cells }, times)?;
+            grid = Some(cells);
+        }
+        let facets = self.get(SampleFacets { tile: placed, settings, grid, role }, times)?;
+        if below.is_none() {
+            return Ok(facets);
+        }
+        let facets = &facets;
         self.get(ColorFacets { tile, facets, settings, role }, times)
     }
 

@@ -66,7 +66,7 @@ impl ExaminedSum {
         let mut env = self.env.clone();
         env.cancel = cancel.clone();
         let (disk, mut times) = (Cache::default(), StageTimes::new());
-        let sample = SampleFacets { tile, settings: &settings, role: FacetsRole::Main };
+        let sample = SampleFacets { tile, settings: &settings, grid: None, role: FacetsRole::Main };
         let facets = Arc::new(run_without_memo(&sample, &env, &disk, &mut times)?);
         let facets = Keyed { key: Key::of_numbers(b"second sample"), value: facets };
         let (algorithm, settings) = (*algorithm, &settings);

@@ -230,7 +230,7 @@ fn each_input_of_the_facets_changes_their_key() {
     let with = |tile: usize, change: &dyn Fn(&mut Settings)| {
         let mut changed = settings.clone();
         change(&mut changed);
-        key_of(&SampleFacets { tile: &tiles[tile], settings: &changed, role: FacetsRole::Main })
+        key_of(&SampleFacets { tile: &tiles[tile], settings: &changed, grid: None, role: FacetsRole::Main })
     };
     let same = with(0, &|_| {});
     assert_eq!(same, with(0, &|settings| settings.penumbra = 0.5));
@@ -255,7 +255,7 @@ fn facets_that_a_map_colours_afterwards_are_those_that_are_sampled_with_it() {
             let settings = Settings { normal_bins: bins, ..Settings::of(&loaded.scene) };
             let tile = pipeline.tile(&loaded, &mut times).unwrap();
             let facets = pipeline.facets(&tile, &settings, FacetsRole::Main, &mut times).unwrap();
-            let at_once = SampleFacets { tile: &tile, settings: &settings, role: FacetsRole::Main };
+            let at_once = SampleFacets { tile: &tile, settings: &settings, grid: None, role: FacetsRole::Main };
             assert_eq!(*facets.value, at_once.run(&Env::default()).unwrap(), "{name} {bins:?}");
         }
     }

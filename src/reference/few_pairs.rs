@@ -36,7 +36,7 @@ impl Reference<'_> {
         progress: impl FnMut(usize, f64) -> bool,
     ) -> Vec<Estimate> {
         let sampler = FacetSampler::new(self.mesh);
-        let openness = Openness::measure(&sampler, self.mesh);
+        let openness = Openness::measure(&sampler, self.mesh, &self.grid);
         let is_closed = self.mesh.closes_plane && self.mesh.corner_normals.is_none();
         in_passes(pairs, settings, progress, |number, shift, moments| {
             let facets = sampler.sample(self.mesh, settings.facets, shift);

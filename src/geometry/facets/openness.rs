@@ -34,14 +34,13 @@ pub(crate) struct Openness {
 
 impl Openness {
     /// Measures the openness with rays from a few facets.
-    pub fn measure(sampler: &FacetSampler, mesh: &TileMesh) -> Self {
+    pub fn measure(sampler: &FacetSampler, mesh: &TileMesh, grid: &PeriodicGrid) -> Self {
         let facets = sampler.sample(mesh, TESTED_FACETS, SampleShift::from_seed(0));
-        let grid = PeriodicGrid::new(mesh);
         grid.prepare_rays();
         let directions: Vec<Vec3> = (0..TESTED_DIRECTIONS).map(direction).collect();
         let seen = |facet: usize| {
             let normal = facets.normals[facet];
-            let visible = |to: &&Vec3| is_facet_visible(&grid, &facets, facet, **to);
+            let visible = |to: &&Vec3| is_facet_visible(grid, &facets, facet, **to);
             directions.iter().filter(visible).map(|to| f64::from(normal.dot(*to).powi(2))).sum::<f64>()
         };
         let seen: Vec<f64> = (0..facets.len()).into_par_iter().map(seen).collect();

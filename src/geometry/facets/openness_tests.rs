@@ -10,7 +10,7 @@ fn velvet() -> TileMesh {
 
 fn samples(mesh: &TileMesh, count: usize, by_openness: bool) -> impl Iterator<Item = Facets> {
     let sampler = FacetSampler::new(mesh);
-    let openness = Openness::measure(&sampler, mesh);
+    let openness = Openness::measure(&sampler, mesh, &PeriodicGrid::new(mesh));
     (1..=6).map(SampleShift::from_seed).map(move |shift| {
         if by_openness {
             sampler.sample_by_openness(mesh, count, shift, &openness)

@@ -1,5 +1,7 @@
 //! The first stages: the tile's mesh, the materials of its slots, and its facets.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -9,7 +11,7 @@ use crate::cache::{Key, KeyBuilder};
 use crate::effective::mean_colors;
 use crate::geometry::facets::openness::Openness;
 use crate::geometry::facets::strata::colors_place_facets;
-use crate::geometry::{self, FacetSampler, Facets, SampleShift, TileMesh};
+use crate::geometry::{self, FacetSampler, Facets, PeriodicGrid, SampleShift, TileMesh};
 use crate::pipeline::Env;
 use crate::pipeline::stage::{Keyed, Stage, lock};
 use crate::plan::{Preset, Settings};
@@ -197,7 +199,16 @@ pub(super) fn hash_sampling_into(settings: &Settings, key: &mut KeyBuilder) {
 pub struct SampleFacets<'a> {
     pub tile: &'a Keyed<TileShape>,
     pub settings: &'a Settings,
+    /// The grid of the tile's cells, if it is known. It is no input: it follows from the tile.
+    pub grid: Option<Arc<PeriodicGrid>>,
     pub role: FacetsRole,
+}
+
+impl SampleFacets<'_> {
+    /// Returns true if the grid of cells is used, because much of a surface that overhangs is hidden.
+    pub fn needs_grid(tile: &TileShape, settings: &Settings) -> bool {
+        settings.preset != Preset::Wu2011 && !tile.flat && !tile.height_field
+    }
 }
 
 /// Facets that are needed in turns, so that each role has its own slot in the memo.
@@ -238,12 +249,12 @@ impl Stage for SampleFacets<'_> {
             None if settings.preset == Preset::Wu2011 => Facets::sample_wu2011(mesh, settings.facets, settings.seed),
             None => {
                 let (sampler, shift) = (FacetSampler::new(mesh), SampleShift::from_seed(settings.seed));
-                if self.tile.height_field {
-                    sampler.sample(mesh, settings.facets, shift)
-                } else {
-                    // Much of a surface that overhangs is hidden.
-                    let openness = Openness::measure(&sampler, mesh);
+                if Self::needs_grid(self.tile, settings) {
+                    let grid = self.grid.clone().unwrap_or_else(|| Arc::new(PeriodicGrid::new(mesh)));
+                    let openness = Openness::measure(&sampler, mesh, &grid);
                     sampler.sample_by_openness(mesh, settings.facets, shift, &openness)
+                } else {
+                    sampler.sample(mesh, settings.facets, shift)
                 }
             }
         };
