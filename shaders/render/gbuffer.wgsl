@@ -55,8 +55,8 @@ struct Vertex {
 // True if the origins are used.
 override SHADOWED: bool = true;
 
-// SAME_NORMAL and SAME_TANGENT of shading_points.rs.
-const SAME_NORMAL: f32 = 0.99939;
+// MIN_NORMAL_COSINE and MIN_TANGENT_COSINE of shading_points.rs.
+const SAME_NORMAL: f32 = 0.99863;
 const SAME_TANGENT: f32 = 0.9962;
 
 struct Projected {

@@ -6,8 +6,8 @@ use super::gbuffer::perpendicular;
 use super::raster::NO_TRIANGLE;
 use crate::render::{CameraView, GBuffer, ObjectMesh};
 
-/// Bounds the angle between normals of samples that share one evaluation: the cosine of 2°.
-const MIN_NORMAL_COSINE: f32 = 0.999_39;
+/// Bounds the angle between normals of samples that share one evaluation: the cosine of 3°.
+const MIN_NORMAL_COSINE: f32 = 0.998_63;
 /// Bounds the angle between their tangents, which vary fast near poles: the cosine of 5°.
 const MIN_TANGENT_COSINE: f32 = 0.996_2;
 
