@@ -21,10 +21,6 @@ use super::runner::JobContext;
 use super::shared::{SharedState, SmallScale, lock, small_scale};
 use super::tone::color_image;
 
-/// Intermediate images: their shading, the time limit [ms], and samples per side of a pixel.
-const STEPS: [(Shading, f64, usize); 2] = [(Shading::Refined, 300.0, 1), (Shading::Refined, 2000.0, 1)];
-/// The same under a colour map: without its filter, then with it.
-const FILTERED_STEPS: [(Shading, f64, usize); 2] = [(Shading::Refined, 300.0, 1), (Shading::Filtered, 1200.0, 2)];
 /// Time of the final image [ms] below which no intermediate image delays it.
 const QUICK_FINAL_MS: f64 = 700.0;
 /// Time limit for shading the final image [ms]. An exported image has no limit.
@@ -36,7 +32,7 @@ const DRAFT_CANCEL_DELAY: Duration = Duration::from_millis(700);
 /// Interval at which refinement checks whether the draft has ended.
 const POLL: Duration = Duration::from_millis(5);
 /// Time without a new edit after which refinement begins.
-const PAUSE: Duration = Duration::from_millis(80);
+const PAUSE: Duration = Duration::from_millis(60);
 /// Time without a new edit after the final image, after which its error is estimated.
 const STATED_PAUSE: Duration = Duration::from_millis(400);
 
@@ -93,15 +89,10 @@ impl ImageWorker {
             return self.render_slab(job, Grade::Draft, fitting(job.size, MAX_PIXELS[0]), cancel);
         }
         if let Some(outcome) = self.shared.known(&job.loaded) {
-            let size = self.affordable(job, Shading::Refined, DraftDetail::shading_ms(DRAFT_MS, start));
-            return self.render(
-                job,
-                ShadedMaterial::Outcome(&outcome.without_times()),
-                Shading::Refined,
-                size,
-                1,
-                cancel,
-            );
+            let shading = refined_shading(&outcome);
+            let size = self.affordable(job, shading, DraftDetail::shading_ms(DRAFT_MS, start));
+            let outcome = outcome.without_times();
+            return self.render(job, ShadedMaterial::Outcome(&outcome), shading, size, 1, cancel);
         }
         if let Some(preview) = self.render_gpu_draft(job, cancel)? {
             return Ok(preview);
@@ -110,7 +101,7 @@ impl ImageWorker {
         draft.scene.quality.facets = self.detail.facets();
         let material_start = Instant::now();
         let outcome = self.pipeline.effective(&draft).and_then(|outcome| {
-            if self.backend == "cpu" || !self.renderer.is_hardware() {
+            if !self.is_on_gpu() {
                 outcome.shading_brdf(cancel)?;
             }
             Ok(outcome)
@@ -128,10 +119,9 @@ impl ImageWorker {
 
     /// Renders a draft whose visibility and facet sum the GPU computes, at the finest level that meets the time limit.
     fn render_gpu_draft(&mut self, job: &ImageJob, cancel: &Cancel) -> Result<Option<RenderedPreview>> {
-        let on_gpu = self.backend != "cpu" && self.renderer.is_hardware();
         let shows_tile =
             has_analytic_surface(&job.loaded) || self.renderer.is_close(&camera(&job.loaded), job.size, false);
-        if !on_gpu || shows_tile {
+        if !self.is_on_gpu() || shows_tile {
             return Ok(None);
         }
         let Some(tile) = self.gpu_drafts.tile(&job.loaded, &mut self.pipeline)? else { return Ok(None) };
@@ -150,6 +140,11 @@ impl ImageWorker {
             self.gpu_drafts.record(counted.iter().sum());
         }
         Ok(Some(preview))
+    }
+
+    /// Returns true if a hardware GPU renders the images.
+    fn is_on_gpu(&self) -> bool {
+        self.backend != "cpu" && self.renderer.is_hardware()
     }
 
     /// Chooses the backend. Only a worker that `can_wait` opens a GPU before the window reports the GPUs.
@@ -217,12 +212,18 @@ impl ImageWorker {
         *lock(&self.shared.best) = Some((small_scale(&job.loaded), outcome.clone()));
         report(ImageResult::Doing(job.version, "Refining the image"));
         self.renderer.prepare(&self.pipeline, &job.loaded)?;
+        if !self.is_on_gpu() {
+            let table_ms = outcome.shading_brdf(context.cancel)?.ms;
+            outcome.times.extend((table_ms > 0.005).then_some(("picture table", table_ms)));
+        }
+        let refined = refined_shading(&outcome);
         let (of_final, steps) = if job.loaded.scene.color_map.is_some() {
-            (Shading::Filtered, FILTERED_STEPS)
+            (Shading::Filtered, [(refined, 300.0, 1), (Shading::Filtered, 1200.0, 2)])
         } else {
-            (Shading::Refined, STEPS)
+            (refined, [(refined, 300.0, 1), (refined, 2000.0, 1)])
         };
-        let mut rendered = (0, Shading::Refined);
+        let mut rendered = (0, refined);
+        // Shading, time limit [ms] and samples per side of a pixel of the images before the final one.
         for (shading, budget, samples) in steps {
             let step = self.affordable(job, shading, budget);
             let pixels = step[0] * step[1];
@@ -379,11 +380,17 @@ impl ImageWorker {
 
     /// The largest size with the view's aspect ratio that is estimated to take at most `budget_ms`.
     fn affordable(&self, job: &ImageJob, shading: Shading, budget_ms: f64) -> [usize; 2] {
-        let full = fitting(job.size, MAX_PIXELS[usize::from(self.backend != "cpu" && self.renderer.is_hardware())]);
+        let full = fitting(job.size, MAX_PIXELS[usize::from(self.is_on_gpu())]);
         let camera = camera(&job.loaded);
         let known = |size, samples_per_side| self.renderer.known_points(&camera, size, samples_per_side);
         self.costs.affordable(full, shading, budget_ms, known)
     }
+}
+
+/// How an image of a refined material is shaded, if it is known what images read.
+fn refined_shading(outcome: &Outcome) -> Shading {
+    let is_exact = outcome.known_shading_brdf().is_some_and(|read| Arc::ptr_eq(&read, &outcome.brdf));
+    if is_exact { Shading::Exact } else { Shading::Refined }
 }
 
 /// Returns true if images show an analytic surface at every distance, and `f̄` at none.

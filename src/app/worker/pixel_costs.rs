@@ -22,8 +22,10 @@ const MIN_SIDE: usize = 24;
 pub enum Shading {
     /// With the draft's BRDF.
     Draft,
-    /// With the refined BRDF.
+    /// With the refined BRDF, from a table or from a sum over few facets.
     Refined,
+    /// With the refined BRDF itself, because no table is close enough.
+    Exact,
     /// Under a colour map that is filtered in each pixel.
     Filtered,
 }
@@ -39,14 +41,14 @@ impl Shading {
 #[derive(Debug)]
 pub struct PixelCosts {
     /// Of each [`Shading`], for one and for four samples. With four, most of the time goes to edges.
-    shading: [[Option<f64>; 2]; 3],
+    shading: [[Option<f64>; 2]; 4],
     /// To find the point that a pixel shows and the lights that reach it, for one and for four samples.
     points: [f64; 2],
 }
 
 impl Default for PixelCosts {
     fn default() -> Self {
-        Self { shading: [[None; 2]; 3], points: [FIRST_POINT; 2] }
+        Self { shading: [[None; 2]; 4], points: [FIRST_POINT; 2] }
     }
 }
 
@@ -120,6 +122,9 @@ mod tests {
         assert_eq!(size(1e-3, KnownPoints::All), [50, 25], "the smallest, however long it takes");
         let refined = costs.affordable([400, 200], Shading::Refined, 100.0, |_, _| KnownPoints::None);
         assert!(refined[0] < 200, "the refined BRDF was not measured yet: {refined:?}");
+        costs.record(Shading::Refined, 1, [100, 100], &RenderTimes { shading_ms: 5.0, ..RenderTimes::default() });
+        let exact = costs.affordable([400, 200], Shading::Exact, 100.0, |_, _| KnownPoints::All);
+        assert!(exact[0] < 400, "that a table is quick says nothing about the BRDF itself: {exact:?}");
         // Four samples cost what one does until they are measured; later, neither changes the other.
         assert_eq!(costs.of_image([100, 100], Shading::Draft, 2)[0], 10.0);
         costs.record(Shading::Draft, 2, [100, 100], &RenderTimes { shading_ms: 50.0, ..RenderTimes::default() });
