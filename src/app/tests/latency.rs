@@ -1,5 +1,6 @@
 //! Latency from an edit to the new image: a measurement that runs only by name.
 
+use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use egui_kittest::Harness;
@@ -22,25 +23,54 @@ struct Latency {
     brightness_step: f64,
 }
 
+/// The frames of a window, which are drawn only on request. The workers have the cores for the rest of the time.
+struct Frames {
+    requests: Receiver<Instant>,
+    /// The time of the next frame, if one was requested.
+    due: Option<Instant>,
+}
+
+impl Frames {
+    fn of(harness: &Harness<'static, Option<Editor>>) -> Self {
+        let (sender, requests) = channel();
+        harness.ctx.set_request_repaint_callback(move |request| {
+            // Sending fails only if the measurement has ended.
+            let _ = sender.send(Instant::now() + request.delay.min(MAX_WAIT));
+        });
+        Self { requests, due: None }
+    }
+
+    /// Draws a frame, and waits until the next one is due.
+    fn draw(&mut self, harness: &mut Harness<'static, Option<Editor>>) {
+        harness.step();
+        self.due = None;
+        loop {
+            let wait = self.due.map_or(MAX_WAIT, |due| due.saturating_duration_since(Instant::now()));
+            let Ok(request) = self.requests.recv_timeout(wait) else { return };
+            self.due = Some(self.due.map_or(request, |due| due.min(request)));
+        }
+    }
+}
+
 /// Opens a scene in a window of 1440 x 900 points and waits for its final image.
-fn opened(name: &str) -> Harness<'static, Option<Editor>> {
+fn opened(name: &str) -> (Harness<'static, Option<Editor>>, Frames) {
     let mut harness = harness(Document::open(name).unwrap());
     harness.set_size(eframe::egui::vec2(1440.0, 900.0));
     let mut scene = (**editor(&mut harness).document.scene()).clone();
     "auto".clone_into(&mut scene.quality.backend);
     editor(&mut harness).document.edit(scene);
+    let mut frames = Frames::of(&harness);
     harness.step();
     let opened = Instant::now();
     while editor(&mut harness).is_busy() && opened.elapsed() < MAX_WAIT {
-        harness.step();
-        std::thread::sleep(Duration::from_millis(10));
+        frames.draw(&mut harness);
     }
-    harness
+    (harness, frames)
 }
 
 /// Edits a scene as a slider does, and waits for all images after each edit. `edit` receives the number of the edit.
 fn latency(name: &str, edits: usize, edit: impl Fn(&mut Scene, usize)) -> Latency {
-    let mut harness = opened(name);
+    let (mut harness, mut frames) = opened(name);
     let (mut times, mut brightness_step) = (Vec::new(), 0.0_f64);
     for number in 0..edits {
         let mut scene = (**editor(&mut harness).document.scene()).clone();
@@ -50,7 +80,7 @@ fn latency(name: &str, edits: usize, edit: impl Fn(&mut Scene, usize)) -> Latenc
         let version = editor(&mut harness).document.version();
         let (mut arrival_ms, mut means) = ([None; 3], [None; 3]);
         while arrival_ms[2].is_none() {
-            harness.step();
+            frames.draw(&mut harness);
             if let Some(preview) =
                 editor(&mut harness).object.preview.as_ref().filter(|preview| preview.version == version)
             {
@@ -68,7 +98,6 @@ fn latency(name: &str, edits: usize, edit: impl Fn(&mut Scene, usize)) -> Latenc
             if start.elapsed() > MAX_WAIT {
                 break;
             }
-            std::thread::sleep(Duration::from_millis(2));
         }
         // Some final images follow the draft directly.
         arrival_ms[1] = arrival_ms[1].or(arrival_ms[2]);
@@ -88,7 +117,7 @@ fn latency(name: &str, edits: usize, edit: impl Fn(&mut Scene, usize)) -> Latenc
 /// Images per second while the camera turns: each image is followed by the next turn at once.
 fn images_per_second(name: &str) -> f64 {
     const IMAGES: u32 = 40;
-    let mut harness = opened(name);
+    let (mut harness, mut frames) = opened(name);
     let (start, mut shown) = (Instant::now(), 0);
     while shown < IMAGES && start.elapsed() < MAX_WAIT {
         let mut scene = (**editor(&mut harness).document.scene()).clone();
@@ -98,8 +127,7 @@ fn images_per_second(name: &str) -> f64 {
         while editor(&mut harness).object.preview.as_ref().is_none_or(|preview| preview.version < version)
             && start.elapsed() < MAX_WAIT
         {
-            harness.step();
-            std::thread::sleep(Duration::from_millis(1));
+            frames.draw(&mut harness);
         }
         shown += 1;
     }
