@@ -11,6 +11,8 @@ use rayon::prelude::*;
 /// The stage that decides whether interreflection is computed, and those that compute it; the decision needs the first three too.
 const DECISION: &str = "bounced_share";
 const LIGHT: [&str; 6] = ["lobe_samplers", "cells", "hierarchy", "mirrors", "transport", "interreflection"];
+/// Those that the facets of a surface that overhangs need, too.
+const SHARED: [&str; 2] = ["cells", "hierarchy"];
 /// Edits per scene, whose median counts.
 const EDITS: u64 = 5;
 
@@ -113,11 +115,14 @@ fn times(switched: &[LoadedScene; 3]) -> Result<Times, String> {
         };
         let [(off, off_ms), (on, _), (decided, _)] =
             [edited(&switched[0])?, edited(&switched[1])?, edited(&switched[2])?];
-        let without = off_ms - sum(&off, |name| name == DECISION || LIGHT.contains(&name));
+        // Facets of a surface that overhangs need the grid of cells and the hierarchy anyway.
+        let is_shared = off.plan.overhangs();
+        let is_of_light = |name: &str| LIGHT.contains(&name) && !(is_shared && SHARED.contains(&name));
+        let without = off_ms - sum(&off, |name| name == DECISION || is_of_light(name));
         // Light that is computed needs the other stages anyway.
         let is_off = decided.plan.interreflection.is_none();
-        let decision = sum(&decided, |name| name == DECISION || is_off && LIGHT.contains(&name));
-        let samples = [without, decision, sum(&on, |name| LIGHT.contains(&name))];
+        let decision = sum(&decided, |name| name == DECISION || is_off && is_of_light(name));
+        let samples = [without, decision, sum(&on, is_of_light)];
         all.iter_mut().zip(samples).for_each(|(all, ms)| all.push(ms));
     }
     let [without, decision, light] = all.map(|mut times| {

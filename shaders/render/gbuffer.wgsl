@@ -55,9 +55,9 @@ struct Vertex {
 // True if the origins are used.
 override SHADOWED: bool = true;
 
-// MIN_NORMAL_COSINE and MIN_TANGENT_COSINE of shading_points.rs.
-const SAME_NORMAL: f32 = 0.99863;
-const SAME_TANGENT: f32 = 0.9962;
+// The constants of shading_points.rs.
+const MIN_NORMAL_COSINE: f32 = 0.99863;
+const MIN_TANGENT_COSINE: f32 = 0.9962;
 
 struct Projected {
     @builtin(position) clip: vec4f,
@@ -199,8 +199,8 @@ fn find_points(@builtin(global_invocation_id) id: vec3u) {
         normals += other.normal;
         tangents += other.tangent;
         is_shared = other.triangle_id != 0u
-            && dot(other.normal, first.normal) >= SAME_NORMAL
-            && dot(other.tangent, first.tangent) >= SAME_TANGENT
+            && dot(other.normal, first.normal) >= MIN_NORMAL_COSINE
+            && dot(other.tangent, first.tangent) >= MIN_TANGENT_COSINE
             && abs(dot(other.position - first.position, first.normal)) <= step;
     }
     if is_shared {

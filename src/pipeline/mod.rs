@@ -179,6 +179,7 @@ impl Pipeline {
         let keeps_places = !tile.flat && (settings.normal_bins.is_none() || tile.mesh.corner_normals.is_none());
         let below = tile.below.as_ref().filter(|_| keeps_places);
         let placed = below.unwrap_or(tile);
+        // Stages of their own, which interreflection shares and whose times are stated apart.
         let mut grid = None;
         if SampleFacets::needs_grid(placed, settings) {
             let cells = self.get(BuildCells { tile: placed }, times)?.value;

@@ -1,8 +1,8 @@
 use glam::Vec3;
 
 use crate::base::Cancel;
-use crate::effective::{Reflectance, Representation};
-use crate::metrics::image_pairs;
+use crate::effective::{EffectiveBrdf, Reflectance, Representation};
+use crate::metrics::{compare, image_pairs};
 use crate::pipeline::Pipeline;
 use crate::scene::{self, LoadedScene};
 
@@ -54,4 +54,34 @@ fn drafts_of_a_weave_and_of_rods_read_tables_within_their_tolerance() {
         eprintln!("{geometry}: table {is_table}, {errors:?}");
         assert!(is_table && errors.rel_l2 <= 0.35 && errors.psnr_db >= 26.0, "{geometry}: {is_table} {errors:?}");
     }
+}
+
+#[test]
+fn a_table_that_is_too_far_after_an_edit_of_colours_is_not_read() {
+    let scene_of = |broad: f32, narrow: f32| {
+        let source = format!(
+            "[tile]\ngeometry = {{ kind = \"heightfield\", path = \"asset:ripples.png\", height_scale = 0.3 }}\n\
+             [[material]]\nname = \"default\"\nbrdf = [{{ kind = \"ggx\", roughness = 0.6, f0 = {broad} }}, \
+             {{ kind = \"ggx\", roughness = 0.06, f0 = {narrow} }}]\n\
+             [quality]\npreset = \"standard\"\nbackend = \"cpu\"\nmethod = \"direct\"\nfacets = 2048\n\
+             [effects]\ninterreflection = \"off\"\npicture_table = \"on\"\n"
+        );
+        let scene = scene::parse(&source).unwrap();
+        LoadedScene { scene, base_dir: "".into(), name: "test".to_owned(), painted: scene::Painted::default() }
+    };
+    let pipeline = Pipeline::new();
+    let never = Cancel::default();
+    let before = pipeline.effective(&scene_of(0.9, 0.0)).unwrap().shading_brdf(&never).unwrap();
+    let Representation::Table(table) = before.brdf.direct_representation() else { panic!("{:?}", before.errors) };
+    let outcome = pipeline.effective(&scene_of(0.0, 0.9)).unwrap();
+    let exact = &outcome.brdf;
+    let Representation::Direct(direct) = exact.direct_representation() else { panic!("the method is direct") };
+    let reused = exact.with_direct_representation(Representation::Table(table.reused(&direct.sum, true).unwrap()));
+    let after = outcome.shading_brdf(&never).unwrap();
+    let pairs = image_pairs(512, 9);
+    let values = |brdf: &EffectiveBrdf| pairs.iter().map(|pair| brdf.eval(pair.i, pair.o)).collect::<Vec<_>>();
+    let [of_reused, of_read] = [&reused, &*after.brdf].map(|brdf| compare(&values(brdf), &values(exact)).rel_l2);
+    eprintln!("before {:?}, reused {of_reused:.3}, read {of_read:.3}, {:?}", before.errors, after.errors);
+    assert!(of_reused > 0.12, "the edit must make the table too far: {of_reused}");
+    assert!(of_read < 0.08, "{of_read}");
 }

@@ -40,15 +40,20 @@ impl Frames {
         Self { requests, due: None }
     }
 
-    /// Draws a frame, and waits until the next one is due.
+    /// Requests a frame now, as an input does.
+    fn request(&mut self) {
+        self.due = Some(Instant::now());
+    }
+
+    /// Waits until a frame is due, and draws it.
     fn draw(&mut self, harness: &mut Harness<'static, Option<Editor>>) {
-        harness.step();
-        self.due = None;
         loop {
             let wait = self.due.map_or(MAX_WAIT, |due| due.saturating_duration_since(Instant::now()));
-            let Ok(request) = self.requests.recv_timeout(wait) else { return };
+            let Ok(request) = self.requests.recv_timeout(wait) else { break };
             self.due = Some(self.due.map_or(request, |due| due.min(request)));
         }
+        self.due = None;
+        harness.step();
     }
 }
 
@@ -77,6 +82,7 @@ fn latency(name: &str, edits: usize, edit: impl Fn(&mut Scene, usize)) -> Latenc
         edit(&mut scene, number);
         let start = Instant::now();
         editor(&mut harness).document.edit(scene);
+        frames.request();
         let version = editor(&mut harness).document.version();
         let (mut arrival_ms, mut means) = ([None; 3], [None; 3]);
         while arrival_ms[2].is_none() {
@@ -123,6 +129,7 @@ fn images_per_second(name: &str) -> f64 {
         let mut scene = (**editor(&mut harness).document.scene()).clone();
         scene.camera.get_or_insert_default().azimuth_deg += 2.0;
         editor(&mut harness).document.edit(scene);
+        frames.request();
         let version = editor(&mut harness).document.version();
         while editor(&mut harness).object.preview.as_ref().is_none_or(|preview| preview.version < version)
             && start.elapsed() < MAX_WAIT

@@ -89,9 +89,12 @@ impl ImageWorker {
             return self.render_slab(job, Grade::Draft, fitting(job.size, MAX_PIXELS[0]), cancel);
         }
         if let Some(outcome) = self.shared.known(&job.loaded) {
-            let shading = refined_shading(&outcome);
-            let size = self.affordable(job, shading, DraftDetail::shading_ms(DRAFT_MS, start));
             let outcome = outcome.without_times();
+            if !self.is_on_gpu() {
+                outcome.shading_brdf(cancel)?;
+            }
+            let shading = self.refined_shading(&outcome);
+            let size = self.affordable(job, shading, DraftDetail::shading_ms(DRAFT_MS, start));
             return self.render(job, ShadedMaterial::Outcome(&outcome), shading, size, 1, cancel);
         }
         if let Some(preview) = self.render_gpu_draft(job, cancel)? {
@@ -212,18 +215,19 @@ impl ImageWorker {
         *lock(&self.shared.best) = Some((small_scale(&job.loaded), outcome.clone()));
         report(ImageResult::Doing(job.version, "Refining the image"));
         self.renderer.prepare(&self.pipeline, &job.loaded)?;
-        if !self.is_on_gpu() {
+        if self.backend == "cpu" || self.renderer.has_no_gpu() {
             let table_ms = outcome.shading_brdf(context.cancel)?.ms;
             outcome.times.extend((table_ms > 0.005).then_some(("picture table", table_ms)));
         }
-        let refined = refined_shading(&outcome);
+        let refined = self.refined_shading(&outcome);
+        // Images before the final one: shading, time limit [ms], samples per side of a pixel. Under a colour map, the first is
+        // without its filter.
         let (of_final, steps) = if job.loaded.scene.color_map.is_some() {
             (Shading::Filtered, [(refined, 300.0, 1), (Shading::Filtered, 1200.0, 2)])
         } else {
             (refined, [(refined, 300.0, 1), (refined, 2000.0, 1)])
         };
         let mut rendered = (0, refined);
-        // Shading, time limit [ms] and samples per side of a pixel of the images before the final one.
         for (shading, budget, samples) in steps {
             let step = self.affordable(job, shading, budget);
             let pixels = step[0] * step[1];
@@ -371,6 +375,12 @@ impl ImageWorker {
         Ok(())
     }
 
+    /// How an image of a refined material is shaded.
+    fn refined_shading(&self, outcome: &Outcome) -> Shading {
+        let reads_exact = || outcome.known_shading_brdf().is_some_and(|read| Arc::ptr_eq(&read, &outcome.brdf));
+        if !self.is_on_gpu() && reads_exact() { Shading::Exact } else { Shading::Refined }
+    }
+
     /// Returns true if a final image is estimated to take at most [`QUICK_FINAL_MS`].
     fn is_quick(&self, job: &ImageJob, shading: Shading, size: [usize; 2]) -> bool {
         let [shading, points] = self.costs.of_image(size, shading, 2);
@@ -385,12 +395,6 @@ impl ImageWorker {
         let known = |size, samples_per_side| self.renderer.known_points(&camera, size, samples_per_side);
         self.costs.affordable(full, shading, budget_ms, known)
     }
-}
-
-/// How an image of a refined material is shaded, if it is known what images read.
-fn refined_shading(outcome: &Outcome) -> Shading {
-    let is_exact = outcome.known_shading_brdf().is_some_and(|read| Arc::ptr_eq(&read, &outcome.brdf));
-    if is_exact { Shading::Exact } else { Shading::Refined }
 }
 
 /// Returns true if images show an analytic surface at every distance, and `f̄` at none.

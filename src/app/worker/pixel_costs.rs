@@ -24,7 +24,7 @@ pub enum Shading {
     Draft,
     /// With the refined BRDF, from a table or from a sum over few facets.
     Refined,
-    /// With the refined BRDF itself, because no table is close enough.
+    /// With the refined BRDF itself, on the CPU: no table is wanted, or none is close enough.
     Exact,
     /// Under a colour map that is filtered in each pixel.
     Filtered,

@@ -258,6 +258,11 @@ impl PreviewRenderer {
         self.gpu.is_hardware() || opens_screen && self.screen.as_ref().is_some_and(|screen| screen.is_hardware)
     }
 
+    /// Returns true if the CPU renders images for certain, because no hardware GPU is open or may be opened.
+    pub fn has_no_gpu(&self) -> bool {
+        !self.gpu.is_hardware() && !matches!(self.gpu, GpuState::Unopened)
+    }
+
     /// Reason why the GPU failed while it was in use.
     pub fn gpu_error(&self) -> Option<String> {
         self.gpu.gpu_error()

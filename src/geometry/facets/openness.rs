@@ -10,7 +10,7 @@ use super::{FacetSampler, Facets, REPLICATES, SampleShift};
 use crate::geometry::{PeriodicGrid, TileMesh, is_facet_visible};
 
 /// Facets and directions whose visibility is tested. They bound the time of the measurement, which is part of the stage
-/// `facets` of `biscale profile --edit geometry`.
+/// `facets` of `biscale profile --edit geometry`; the grid and its hierarchy are the stages `cells` and `hierarchy`.
 const TESTED_FACETS: usize = 256;
 const TESTED_DIRECTIONS: usize = 12;
 /// Intervals of height, and classes of normals: up, sideways and down.

@@ -199,15 +199,16 @@ pub(super) fn hash_sampling_into(settings: &Settings, key: &mut KeyBuilder) {
 pub struct SampleFacets<'a> {
     pub tile: &'a Keyed<TileShape>,
     pub settings: &'a Settings,
-    /// The grid of the tile's cells, if it is known. It is no input: it follows from the tile.
+    /// The grid of the tile's cells, shared with other stages that cast rays; built if it is needed and absent. It is not part
+    /// of the key, because it follows from the tile.
     pub grid: Option<Arc<PeriodicGrid>>,
     pub role: FacetsRole,
 }
 
 impl SampleFacets<'_> {
-    /// Returns true if the grid of cells is used, because much of a surface that overhangs is hidden.
+    /// Returns true if facets are placed by openness, which casts rays: much of a surface that overhangs is hidden.
     pub fn needs_grid(tile: &TileShape, settings: &Settings) -> bool {
-        settings.preset != Preset::Wu2011 && !tile.flat && !tile.height_field
+        settings.preset != Preset::Wu2011 && !tile.height_field
     }
 }
 

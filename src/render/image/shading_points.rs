@@ -6,9 +6,9 @@ use super::gbuffer::perpendicular;
 use super::raster::NO_TRIANGLE;
 use crate::render::{CameraView, GBuffer, ObjectMesh};
 
-/// Bounds the angle between normals of samples that share one evaluation: the cosine of 3°.
+/// Bounds the angles between the normals of a pixel's first and other samples that share one evaluation: the cosine of 3°.
 const MIN_NORMAL_COSINE: f32 = 0.998_63;
-/// Bounds the angle between their tangents, which vary fast near poles: the cosine of 5°.
+/// Bounds the angles between their tangents, which vary fast near poles: the cosine of 5°.
 const MIN_TANGENT_COSINE: f32 = 0.996_2;
 
 /// Points to shade, ordered by pixel; every array has one entry per point.
