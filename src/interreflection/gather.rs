@@ -163,8 +163,8 @@ impl<'a> Exchange<'a> {
                 .par_chunks_mut(channels * viewers)
                 .zip(from_light.par_chunks_mut(channels * nodes))
                 .zip(block)
-                .map_init(Vec::new, |to_node, ((to_viewer, from_light), (number, group))| {
-                    self.fill((*number, group), weights, to_node, [&mut *to_viewer, &mut *from_light]);
+                .map(|((to_viewer, from_light), (number, group))| {
+                    self.fill((*number, group), weights, [&mut *to_viewer, &mut *from_light]);
                     is_examined(group, per_examined).then(|| self.variance(group, weights, [to_viewer, from_light]))
                 })
                 .collect();
@@ -209,28 +209,22 @@ impl<'a> Exchange<'a> {
 
     /// Writes what a mirror image of a numbered group of rays sends to each viewer, and what it carries from each light.
     /// Matte elements stay as they are: all images send nearly as much, and all rays of an element would share one image.
-    /// `to_node` is scratch memory, whose content does not matter.
-    fn fill(
-        &self,
-        (number, group): (usize, &Range<usize>),
-        weights: &ViewerWeights,
-        to_node: &mut Vec<f32>,
-        [to_viewer, from_light]: [&mut [f32]; 2],
-    ) {
+    fn fill(&self, (number, group): (usize, &Range<usize>), weights: &ViewerWeights, rows: [&mut [f32]; 2]) {
+        let [to_viewer, from_light] = rows;
         let Ray { element, direction, .. } = self.transport.rays[group.start];
         let element = element as usize;
         let normal = self.facets.normals[self.transport.facets[element] as usize];
         let away = if self.materials[element].is_matte { normal } else { direction };
         let nodes = self.nodes[0].len();
-        to_node.clear();
-        to_node.resize(self.channels * nodes, 0.0);
-        self.add_lobe(element, [normal, away], Vec3::ONE, (&self.nodes, self.visible(element)), to_node);
+        let mut to_node = vec![0.0; self.channels * nodes];
+        self.add_lobe(element, [normal, away], Vec3::ONE, (&self.nodes, self.visible(element)), &mut to_node);
+        to_viewer.fill(0.0);
         from_light.fill(0.0);
         let drawn = match self.materials[element].is_matte || self.mirrored.images.len() == 1 {
             true => Some((0, 1.0)),
-            false => self.drawn_image(number, to_node, weights),
+            false => self.drawn_image(number, &to_node, weights),
         };
-        let Some((reflection, scale)) = drawn else { return to_viewer.fill(0.0) };
+        let Some((reflection, scale)) = drawn else { return };
         let image = &self.mirrored.images[reflection];
         for (to_viewer, to_node) in to_viewer.chunks_mut(self.mirrored.computed.len()).zip(to_node.chunks(nodes)) {
             let of_viewers = to_viewer.iter_mut().zip(&self.mirrored.computed);

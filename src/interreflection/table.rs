@@ -184,23 +184,22 @@ impl NodeWeights {
 /// times the step of the grid; the errors at the step itself follow from both (Richardson 1911).
 fn interpolation_error(grid: ReducedGrid, weights: &NodeWeights, values: &[Vec3]) -> f64 {
     let n = grid.len();
-    let of_node = |node: usize| {
+    let of_row = |(index, row): (usize, &[Vec3])| {
         let mut sums = [[0.0_f64; 3]; 2];
-        let (ring, azimuth) = grid.ring_and_azimuth(node);
-        let (first, count) = (grid.first_node(ring), grid.azimuths_of(ring));
-        // Near the horizon there is no fourth ring, and a parabola takes three.
-        let (has_rings, has_four) = (ring + 1 < grid.rings, ring + 3 < grid.rings);
-        let rings = [-3, -1, 1, if has_four { 3 } else { 1 }].map(|away| {
-            let turns = azimuth as f32 / count as f32;
-            has_rings.then(|| grid.nodes_of_ring(&grid.ring_taps(ring as i32 + away, turns, 1.0)))
-        });
-        for index in (0..n).step_by(EXAMINED) {
-            let row = &values[index * n..(index + 1) * n];
+        for node in 0..grid.first_node(grid.rings) {
+            let (ring, azimuth) = grid.ring_and_azimuth(node);
+            let (first, count) = (grid.first_node(ring), grid.azimuths_of(ring));
             let weight = weights.of_pair(index, node);
-            if let [Some(a), Some(b), Some(c), Some(d)] = rings {
-                let [a, b, c, d] =
-                    [a, b, c, d].map(|taps| taps.into_iter().map(|(node, weight)| row[node] * weight).sum::<Vec3>());
-                let between = if has_four { middle([a, b, c, d]) } else { 0.75 * b + 0.375 * c - 0.125 * a };
+            if ring + 1 < grid.rings {
+                let turns = azimuth as f32 / count as f32;
+                let at = |away: i32| {
+                    let taps = grid.ring_taps(ring as i32 + away, turns, 1.0);
+                    grid.nodes_of_ring(&taps).into_iter().map(|(node, weight)| row[node] * weight).sum::<Vec3>()
+                };
+                // Near the horizon there is no fourth ring, and a parabola takes three.
+                let has_four = ring + 3 < grid.rings;
+                let [a, b, c] = [-3, -1, 1].map(at);
+                let between = if has_four { middle([a, b, c, at(3)]) } else { 0.75 * b + 0.375 * c - 0.125 * a };
                 add(&mut sums[0], weight, row[node], [between, row[node]]);
             }
             if count > 12 {
@@ -213,7 +212,7 @@ fn interpolation_error(grid: ReducedGrid, weights: &NodeWeights, values: &[Vec3]
         }
         sums
     };
-    let examined: Vec<_> = (0..grid.first_node(grid.rings)).into_par_iter().map(of_node).collect();
+    let examined: Vec<_> = values.par_chunks(n).enumerate().step_by(EXAMINED).map(of_row).collect();
     let sum = |kind: usize| [0, 1, 2].map(|k| examined.iter().map(|sums| sums[kind][k]).sum::<f64>());
     let [along_rings, along_azimuths] = [sum(0), sum(1)];
     // Few rings have neighbours at four times the step, so that azimuths show the order for both.

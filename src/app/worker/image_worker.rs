@@ -36,6 +36,8 @@ const PAUSE: Duration = Duration::from_millis(60);
 /// Time without a new edit after the final image, after which its error is estimated.
 const STATED_PAUSE: Duration = Duration::from_millis(400);
 
+/// Time of a stage [ms] below which it is not stated.
+const MIN_STAGE_MS: f64 = 0.005;
 /// Stage that computes visibility and facet sum on the GPU.
 const SUM_STAGE: &str = "visibility and product";
 
@@ -215,9 +217,9 @@ impl ImageWorker {
         *lock(&self.shared.best) = Some((small_scale(&job.loaded), outcome.clone()));
         report(ImageResult::Doing(job.version, "Refining the image"));
         self.renderer.prepare(&self.pipeline, &job.loaded)?;
-        if self.backend == "cpu" || self.renderer.has_no_gpu() {
+        if self.backend == "cpu" || self.renderer.has_no_hardware() {
             let table_ms = outcome.shading_brdf(context.cancel)?.ms;
-            outcome.times.extend((table_ms > 0.005).then_some(("picture table", table_ms)));
+            outcome.times.extend((table_ms > MIN_STAGE_MS).then_some(("picture table", table_ms)));
         }
         let refined = self.refined_shading(&outcome);
         // Images before the final one: shading, time limit [ms], samples per side of a pixel. Under a colour map, the first is
@@ -341,7 +343,7 @@ impl ImageWorker {
             ShadedMaterial::GpuTile(of) => (&of.plan, of.settings.preset, &of.times, &of.notes, None),
         };
         let mut stages = times.clone();
-        stages.extend(large.into_iter().filter(|(_, ms)| *ms > 0.005));
+        stages.extend(large.into_iter().filter(|(_, ms)| *ms > MIN_STAGE_MS));
         stages.extend(tone.map(|ms| ("tone", ms)));
         let mut notes = notes.clone();
         notes.extend(self.renderer.warnings());

@@ -258,8 +258,8 @@ impl PreviewRenderer {
         self.gpu.is_hardware() || opens_screen && self.screen.as_ref().is_some_and(|screen| screen.is_hardware)
     }
 
-    /// Returns true if the CPU renders images for certain, because no hardware GPU is open or may be opened.
-    pub fn has_no_gpu(&self) -> bool {
+    /// Returns true if no hardware GPU renders images: none is open, and the next image opens none.
+    pub fn has_no_hardware(&self) -> bool {
         !self.gpu.is_hardware() && !matches!(self.gpu, GpuState::Unopened)
     }
 
