@@ -51,19 +51,23 @@ pub(crate) fn quick_estimate(direct: &Direct, facets: &Facets) -> (ErrorEstimate
         estimate.rel_l2 = SAFETY_FACTOR * (all.iter().map(|at| at.1).sum::<f64>() / totals.norm).sqrt();
         estimate.psnr_db = totals.psnr_db(estimate.rel_l2);
     }
-    (estimate, PairValues(all.into_iter().map(|(f_bar, _, area)| (f_bar, area)).collect()))
+    let quick = all.into_iter().map(|(f_bar, _, area)| (f_bar, area)).collect();
+    (estimate, PairValues { quick, ..PairValues::default() })
 }
 
-/// `f̄` without interreflection and `a_v` of the first pairs of an estimate.
+/// `f̄` without interreflection and `a_v` of the pairs of a quick estimate and of a full one; empty until they are needed.
 #[derive(Debug, Default)]
-pub(crate) struct PairValues(Vec<(DVec3, f64)>);
+pub(crate) struct PairValues {
+    quick: Vec<(DVec3, f64)>,
+    all: Vec<(DVec3, f64)>,
+}
 
 /// Estimates the part of the errors of `f̄` that is due to the light between facets. Few pairs suffice if they show less than
-/// a part of the bound; their values may be `known`.
+/// a part of the bound. Adds the values that it needs to those that are `known`.
 pub(crate) fn estimate_of_bounced(
     direct: &Direct,
     (bounced, base_area): (&InterreflectionTable, f64),
-    known: &PairValues,
+    known: &mut PairValues,
     (bound, part): (ErrorBound, f64),
 ) -> ErrorEstimate {
     let of = |pair: Pair| {
@@ -86,6 +90,15 @@ pub(crate) fn estimate_of_bounced(
         let psnr_db = totals.psnr_db(rel_l2);
         ErrorEstimate { rel_l2, psnr_db, interreflection: rel_l2, ..ErrorEstimate::default() }
     };
-    let quick = if known.0.is_empty() { error(&QUICK_PAIRS.evaluate(of, |at| at.0)) } else { error(&known.0) };
-    if quick.excess(bound) > part { error(&PAIRS.evaluate(of, |at| at.0)) } else { quick }
+    if known.quick.is_empty() {
+        known.quick = QUICK_PAIRS.evaluate(of, |at| at.0);
+    }
+    let quick = error(&known.quick);
+    if quick.excess(bound) <= part {
+        return quick;
+    }
+    if known.all.is_empty() {
+        known.all = PAIRS.evaluate(of, |at| at.0);
+    }
+    error(&known.all)
 }

@@ -280,7 +280,7 @@ impl Pipeline {
     /// the representation that images read.
     fn outcome_of(&self, scene: &Scene, refined: RefinedSum, mut times: StageTimes) -> Result<Outcome> {
         let refinement_note = refined.note();
-        let RefinedSum { inputs, visibility, direct, estimate, values, .. } = refined;
+        let RefinedSum { inputs, visibility, direct, estimate, mut values, .. } = refined;
         let (mut close_to_bound, algorithm) = (estimate.is_some(), inputs.plan.algorithm);
         let keys = self.shading_keys(&inputs, &visibility);
         let start = Instant::now();
@@ -298,7 +298,7 @@ impl Pipeline {
                 assignment: &materials,
                 material_of_slot: &material_of_slot,
             };
-            let light = self.refined_interreflection(&surface, first, (&direct, &values, &settings), &mut times)?;
+            let light = self.refined_interreflection(&surface, first, (&direct, &mut values, &settings), &mut times)?;
             close_to_bound |= light.close_to_bound;
             notes.extend(light.note(&first, settings.preset));
             plan.note_interreflection(light.settings);

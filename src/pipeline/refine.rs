@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::inputs::{Processor, TileInputs};
-use super::stage::elapsed_ms;
+use super::stage::add_time;
 use super::{Keyed, Pipeline, StageTimes, VisibleSurface};
 use crate::base::Result;
 use crate::effective::{
@@ -90,7 +90,7 @@ impl Pipeline {
         loop {
             let start = Instant::now();
             sum.examine(bound);
-            times.push(("error_estimate", elapsed_ms(start)));
+            add_time(times, "error_estimate", start);
             let next = sum.estimate.and_then(|estimate| sum.refinement.next(&estimate, bound, &settings));
             let Some(refinement) = next else { return Ok(sum) };
             self.env.cancel.check()?;
@@ -133,7 +133,7 @@ impl Pipeline {
         &self,
         surface: &VisibleSurface<'_>,
         first: InterreflectionSettings,
-        (direct, values, settings): (&Direct, &PairValues, &Settings),
+        (direct, values, settings): (&Direct, &mut PairValues, &Settings),
         times: &mut StageTimes,
     ) -> Result<RefinedInterreflection> {
         let base_area = f64::from(surface.tile.mesh.base_area());
@@ -146,7 +146,7 @@ impl Pipeline {
             let Some(bound) = settings.refinement_bound() else { return Ok(done(false)) };
             let start = Instant::now();
             let estimate = estimate_of_bounced(direct, (&table, base_area), values, (bound, QUICK_PART));
-            times.push(("error_estimate", elapsed_ms(start)));
+            add_time(times, "error_estimate", start);
             close_to_bound |= estimate.excess(bound) > QUICK_PART;
             let next = finer_interreflection([&first, &refined], &table, &estimate, bound);
             let Some(next) = next else { return Ok(done(close_to_bound)) };

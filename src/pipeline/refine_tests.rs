@@ -55,6 +55,21 @@ fn a_difficult_tile_is_refined_until_it_states_an_error_within_the_bound() {
 }
 
 #[test]
+fn a_stage_that_refinement_repeats_is_listed_once_with_the_time_of_all_its_runs() {
+    let start = std::time::Instant::now();
+    let outcome = effective(&open("fig1d_yellow_sides", "draft", &grooves("tile.geometry.depth=40")));
+    let elapsed = crate::pipeline::stage::elapsed_ms(start);
+    let of = |stage: &str| outcome.times.iter().filter(|(name, _)| *name == stage).map(|(_, ms)| *ms).collect::<Vec<_>>();
+    assert!(outcome.times.iter().all(|(name, _)| of(name).len() == 1), "{:?}", outcome.times);
+    let sum: f64 = outcome.times.iter().map(|(_, ms)| ms).sum();
+    assert!(sum > 0.0 && sum < elapsed, "{sum} {elapsed}");
+    let long = start - std::time::Duration::from_secs(1);
+    let mut times = vec![("facets", 500.0)];
+    crate::pipeline::stage::add_time(&mut times, "facets", long);
+    assert!(times.len() == 1 && times[0].1 >= 1500.0, "{times:?}");
+}
+
+#[test]
 fn limits_end_refinement_and_a_warning_states_the_error() {
     let mirror = "material.default.brdf={kind=\"cook_torrance\",roughness=0.02,f0=[1,1,1]}";
     let loaded = open("fig8d_leather", "standard", &["quality.max_facets=16", mirror]);

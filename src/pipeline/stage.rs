@@ -10,8 +10,16 @@ use super::Env;
 use crate::base::Result;
 use crate::cache::{Cache, Key, KeyBuilder, Reader, Stored, Writer};
 
-/// Milliseconds of the stages that ran, in order. A stage whose result was known is not listed.
+/// Milliseconds of the stages that ran, in the order of their first runs. A stage whose result was known is not listed.
 pub type StageTimes = Vec<(&'static str, f64)>;
+
+/// Adds the time since `start` to that of a stage. Refinement runs a stage more than once.
+pub(super) fn add_time(times: &mut StageTimes, stage: &'static str, start: Instant) {
+    match times.iter_mut().find(|(name, _)| *name == stage) {
+        Some((_, ms)) => *ms += elapsed_ms(start),
+        None => times.push((stage, elapsed_ms(start))),
+    }
+}
 
 /// A pure function of settings and of the results of earlier stages.
 pub trait Stage {
@@ -159,7 +167,7 @@ fn compute<S: Stage>(stage: &S, key: Key, env: &Env, disk: &Cache, times: &mut S
     if let Some((codec, entry)) = &stored
         && let Some(value) = entry.read(codec.read).filter(|value| stage.accepts(value))
     {
-        times.push((codec.cached_name, elapsed_ms(start)));
+        add_time(times, codec.cached_name, start);
         return Ok(value);
     }
     env.cancel.begin(S::NAME);
@@ -170,7 +178,7 @@ fn compute<S: Stage>(stage: &S, key: Key, env: &Env, disk: &Cache, times: &mut S
         // A cancelled stage may have returned anything.
         env.cancel.check()?;
     }
-    times.push((S::NAME, elapsed_ms(start)));
+    add_time(times, S::NAME, start);
     if let Some((codec, entry)) = &stored {
         entry.store(start, &value, codec.write);
     }

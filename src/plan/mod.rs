@@ -150,8 +150,7 @@ impl Plan {
         for (stage, ms) in times {
             let name = if *stage == "product" && self.try_low_rank { "low_rank" } else { stage };
             if let Some(effect) = self.effect_mut(name) {
-                // Refinement runs a stage more than once.
-                *effect.measured_ms.get_or_insert(0.0) += ms;
+                effect.measured_ms = Some(*ms);
             }
         }
     }
