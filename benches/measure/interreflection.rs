@@ -1,5 +1,6 @@
 //! Error and time of the light that facets send to each other, against path tracing.
 
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use biscale::effective::Representation;
@@ -24,8 +25,10 @@ const BOUNCES: [usize; 5] = [1, 2, 4, 8, 16];
 /// As many as a scene can ask for.
 const ALL: usize = 64;
 const PAIRS: usize = 48;
-/// Independent references per case, whose spread is the standard error.
-const SEEDS: u64 = 8;
+/// Relative L2 of the standard errors at which path tracing ends.
+const TARGET: f64 = 0.005;
+/// Numbers of independent references per case, whose spread is the standard error.
+const SEEDS: RangeInclusive<u64> = 8..=1024;
 /// The tiles that the plots show, the first with solid lines.
 const DRAWN: [&str; 2] = ["V-grooves", "egg-crate"];
 /// The plots of the errors against bounces and against time.
@@ -107,7 +110,9 @@ fn scene([geometry, brdf]: [&str; 2], preset: &str, bounces: usize) -> LoadedSce
 
 fn traced(tile: [&str; 2], pairs: &[Pair]) -> Traced {
     let mut moments = vec![[0.0_f64; 2]; pairs.len()];
-    for seed in 1..=SEEDS {
+    let mut seed = 0;
+    loop {
+        seed += 1;
         // Both estimates sum the same facets, so that direct reflection cancels.
         let settings = ReferenceSettings { facets: 4096, max_passes: 4, target: 0.0, seed };
         let [all, direct] = [ALL, 0].map(|bounces| {
@@ -120,12 +125,16 @@ fn traced(tile: [&str; 2], pairs: &[Pair]) -> Traced {
             sums[0] += value;
             sums[1] += value * value;
         }
+        let n = seed as f64;
+        let values: Vec<f64> = moments.iter().map(|[sum, _]| sum / n).collect();
+        let variance = |([_, squares], mean): (&[f64; 2], &f64)| (squares / n - mean * mean).max(0.0) / (n - 1.0);
+        let noise: f64 = moments.iter().zip(&values).map(variance).sum();
+        let std_error = (noise / values.iter().map(|value| value * value).sum::<f64>()).sqrt();
+        if seed >= *SEEDS.start() && (std_error <= TARGET || seed >= *SEEDS.end()) {
+            eprintln!("{seed} seeds");
+            return Traced { std_error, values };
+        }
     }
-    let n = SEEDS as f64;
-    let values: Vec<f64> = moments.iter().map(|[sum, _]| sum / n).collect();
-    let variance = |([_, squares], mean): (&[f64; 2], &f64)| (squares / n - mean * mean).max(0.0) / (n - 1.0);
-    let noise: f64 = moments.iter().zip(&values).map(variance).sum();
-    Traced { std_error: (noise / values.iter().map(|value| value * value).sum::<f64>()).sqrt(), values }
 }
 
 fn measure(name: String, tile: [&str; 2], color: &'static str, pairs: &[Pair]) -> Row {

@@ -16,7 +16,7 @@ use crate::cache::{Cache, Key, KeyBuilder};
 use crate::effective::{Direct, EffectiveBrdf, Interpolation, Nodes, Representation, ShadingTable, TableContent};
 use crate::geometry::mirror_planes;
 use crate::math::directions::HemispherePairGrid;
-use crate::metrics::{Errors, Pair, image_pairs, upper_errors};
+use crate::metrics::{Errors, Pair, compare, image_pairs, upper_errors};
 use crate::plan::{IMAGE_CHECK_PAIRS, Settings};
 use crate::scene::Switch;
 use crate::visibility::Visibility;
@@ -36,6 +36,9 @@ const SUBSETS: [usize; 3] = [1200, 3000, 8000];
 /// too large, they are computed again from all facets.
 const COARSE_SUBSET_DIVISOR: usize = 4;
 const COARSE_TABLE_NODES: Range<usize> = 10_000..20_000;
+
+/// Factor by which a check that does not decide gets more pairs.
+const MORE_PAIRS: usize = 4;
 
 /// Tables of more nodes are first computed only where the pairs of the check read them, at about 10,000 nodes.
 const MIN_TRIAL_NODES: usize = 20_000;
@@ -140,7 +143,7 @@ impl Shading {
         if self.grids.is_empty() {
             return Ok(Found::new(self.exact.clone(), None));
         }
-        let check = Check::new(&self.exact, self.seed);
+        let mut check = Check::new(&self.exact, self.seed, IMAGE_CHECK_PAIRS);
         let (reused, has_failed) = self.reuse();
         if let Some((brdf, errors)) = self.strided_subset(&check) {
             return Ok(Found::new(Arc::new(brdf), Some(errors)));
@@ -148,7 +151,7 @@ impl Shading {
         if has_failed {
             return Ok(Found::new(self.exact.clone(), None));
         }
-        match self.table(reused, &check, cancel, times)? {
+        match self.table(reused, &mut check, cancel, times)? {
             (Some(table), errors) => self.with_bounced_columns(Found::new(Arc::new(table), errors), &check, cancel),
             (None, errors) => Ok(Found::new(self.exact.clone(), errors)),
         }
@@ -167,7 +170,7 @@ impl Shading {
         };
         let representation = Representation::Table(table.plus_bounced(sum, cancel)?);
         let brdf = EffectiveBrdf { representation, base_area };
-        let errors = check.errors(&brdf);
+        let errors = check.errors(&brdf).upper;
         if !self.is_close(errors) {
             return Ok(found);
         }
@@ -179,7 +182,7 @@ impl Shading {
         let Representation::Direct(direct) = self.exact.direct_representation() else { return None };
         STRIDES.iter().map_while(|stride| direct.strided_subset(*stride)).find_map(|subset| {
             let brdf = self.exact.with_direct_representation(Representation::Direct(subset));
-            let errors = check.errors(&brdf);
+            let errors = check.errors(&brdf).upper;
             self.is_close(errors).then_some((brdf, errors))
         })
     }
@@ -188,7 +191,7 @@ impl Shading {
     fn table(
         &self,
         reused: Option<ShadingTable>,
-        check: &Check,
+        check: &mut Check,
         cancel: &Cancel,
         times: &mut StageTimes,
     ) -> Result<(Option<EffectiveBrdf>, Option<Errors>)> {
@@ -197,7 +200,7 @@ impl Shading {
         let first = self.grids.iter().position(|grid| Some(*grid) == known).unwrap_or(0);
         if let Some(table) = reused {
             let brdf = self.with_table(table);
-            let errors = check.errors(&brdf);
+            let errors = self.decided_errors(&brdf, check);
             if self.is_close(errors) {
                 return Ok((Some(brdf), Some(errors)));
             }
@@ -206,7 +209,7 @@ impl Shading {
             let errors = match self.attempt(*grid, check, cancel, times)? {
                 Attempt::Table(table) => {
                     let brdf = self.with_table(table);
-                    let errors = check.errors(&brdf);
+                    let errors = self.decided_errors(&brdf, check);
                     if self.is_close(errors) {
                         return Ok((Some(brdf), Some(errors)));
                     }
@@ -232,7 +235,7 @@ impl Shading {
     fn attempt(
         &self,
         grid: HemispherePairGrid,
-        check: &Check,
+        check: &mut Check,
         cancel: &Cancel,
         times: &mut StageTimes,
     ) -> Result<Attempt> {
@@ -253,9 +256,14 @@ impl Shading {
             let mut enough = None;
             for facets in order {
                 let part = Nodes { facets, ..nodes };
-                let trial = self.tabulate(Nodes { read_by: Some(&check.pairs), ..part }, cancel, times)?;
-                let Some(trial) = trial else { return Ok(Attempt::Impossible) };
-                let errors = check.errors(&self.with_table(trial.clone()));
+                let (trial, errors) = loop {
+                    let trial = self.tabulate(Nodes { read_by: Some(&check.pairs), ..part }, cancel, times)?;
+                    let Some(trial) = trial else { return Ok(Attempt::Impossible) };
+                    let errors = check.errors(&self.with_table(trial.clone()));
+                    if !self.asks_for_more(errors, check) {
+                        break (trial, errors.upper);
+                    }
+                };
                 if self.is_close(errors) {
                     enough = Some((part, trial));
                     if facets.is_some() {
@@ -271,7 +279,7 @@ impl Shading {
         } else if facets > 0 && COARSE_TABLE_NODES.contains(&count) {
             let part = Nodes { facets: Some(facets / COARSE_SUBSET_DIVISOR), ..nodes };
             let Some(table) = self.tabulate(part, cancel, times)? else { return Ok(Attempt::Impossible) };
-            if self.is_close(check.errors(&self.with_table(table.clone()))) {
+            if self.is_close(check.errors(&self.with_table(table.clone())).upper) {
                 return Ok(Attempt::Table(table));
             }
         }
@@ -280,6 +288,23 @@ impl Shading {
 
     fn is_close(&self, errors: Errors) -> bool {
         errors.rel_l2 <= self.tolerance.0 && errors.psnr_db >= self.tolerance.1
+    }
+
+    /// Adds pairs to a check if its bound exceeds the tolerance, but the errors that it found do not: a few pairs had large
+    /// errors. Returns true if `check` has more pairs now.
+    fn asks_for_more(&self, errors: CheckedErrors, check: &mut Check) -> bool {
+        let decides = self.is_close(errors.upper) || !self.is_close(errors.found);
+        if decides || check.pairs.len() > IMAGE_CHECK_PAIRS {
+            return false;
+        }
+        *check = Check::new(&self.exact, self.seed, MORE_PAIRS * IMAGE_CHECK_PAIRS);
+        true
+    }
+
+    /// The upper bound of the errors, from more pairs if those of `check` do not decide.
+    fn decided_errors(&self, brdf: &EffectiveBrdf, check: &mut Check) -> Errors {
+        let errors = check.errors(brdf);
+        if self.asks_for_more(errors, check) { check.errors(brdf).upper } else { errors.upper }
     }
 
     /// A table on these nodes; `None` if no table can hold the sum.
@@ -383,9 +408,16 @@ struct Check {
     exact: Vec<Vec3>,
 }
 
+/// Errors that a check found, and their upper bound for similar pairs.
+#[derive(Debug, Clone, Copy)]
+struct CheckedErrors {
+    found: Errors,
+    upper: Errors,
+}
+
 impl Check {
-    fn new(exact: &EffectiveBrdf, seed: u64) -> Self {
-        let mut check = Self { pairs: image_pairs(IMAGE_CHECK_PAIRS, seed ^ 0x7ab1e), exact: Vec::new() };
+    fn new(exact: &EffectiveBrdf, seed: u64, count: usize) -> Self {
+        let mut check = Self { pairs: image_pairs(count, seed ^ 0x7ab1e), exact: Vec::new() };
         check.exact = check.values(exact);
         check
     }
@@ -394,8 +426,9 @@ impl Check {
         self.pairs.par_iter().map(|pair| brdf.eval(pair.i, pair.o)).collect()
     }
 
-    fn errors(&self, brdf: &EffectiveBrdf) -> Errors {
-        upper_errors(&self.values(brdf), &self.exact)
+    fn errors(&self, brdf: &EffectiveBrdf) -> CheckedErrors {
+        let values = self.values(brdf);
+        CheckedErrors { found: compare(&values, &self.exact), upper: upper_errors(&values, &self.exact) }
     }
 }
 

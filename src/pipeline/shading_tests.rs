@@ -57,6 +57,22 @@ fn drafts_of_a_weave_and_of_rods_read_tables_within_their_tolerance() {
 }
 
 #[test]
+fn few_pairs_with_large_errors_are_settled_by_more_pairs() {
+    // One of 512 pairs holds three quarters of the squared error of this weave's table.
+    let loaded = scene::open("table4_skirt", &["tile.geometry.warp_width=0.934782".to_owned()]).unwrap();
+    let outcome = Pipeline::new().effective(&loaded).unwrap();
+    let shading = outcome.shading_brdf(&Cancel::default()).unwrap();
+    assert!(matches!(shading.brdf.representation, Representation::Table(_)), "{:?}", shading.errors);
+    let pairs = image_pairs(4096, 1);
+    let values = |brdf: &EffectiveBrdf| pairs.iter().map(|pair| brdf.eval(pair.i, pair.o)).collect::<Vec<_>>();
+    let errors = compare(&values(&shading.brdf), &values(&outcome.brdf));
+    let (rel_l2, psnr_db) = outcome.settings.image_tolerance;
+    assert!(errors.rel_l2 <= rel_l2 && errors.psnr_db >= psnr_db, "{errors:?}");
+    let bound = shading.errors.unwrap();
+    assert!(bound.rel_l2 <= rel_l2 && bound.rel_l2 > errors.rel_l2, "{bound:?} {errors:?}");
+}
+
+#[test]
 fn a_table_that_is_too_far_after_an_edit_of_colours_is_not_read() {
     let scene_of = |broad: f32, narrow: f32| {
         let source = format!(
