@@ -59,7 +59,8 @@ fn a_stage_that_refinement_repeats_is_listed_once_with_the_time_of_all_its_runs(
     let start = std::time::Instant::now();
     let outcome = effective(&open("fig1d_yellow_sides", "draft", &grooves("tile.geometry.depth=40")));
     let elapsed = crate::pipeline::stage::elapsed_ms(start);
-    let of = |stage: &str| outcome.times.iter().filter(|(name, _)| *name == stage).map(|(_, ms)| *ms).collect::<Vec<_>>();
+    let of =
+        |stage: &str| outcome.times.iter().filter(|(name, _)| *name == stage).map(|(_, ms)| *ms).collect::<Vec<_>>();
     assert!(outcome.times.iter().all(|(name, _)| of(name).len() == 1), "{:?}", outcome.times);
     let sum: f64 = outcome.times.iter().map(|(_, ms)| ms).sum();
     assert!(sum > 0.0 && sum < elapsed, "{sum} {elapsed}");

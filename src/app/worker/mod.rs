@@ -35,6 +35,7 @@ use crate::cache::Cache;
 use crate::pipeline::Pipeline;
 
 use super::document::Snapshot;
+use runner::Threads;
 
 pub use accuracy::{AccuracyChart, AccuracyJob, AccuracyPoint, AccuracyResult, without_settings};
 pub use capture::{CaptureJob, CaptureResult, ShownCapture};
@@ -59,14 +60,14 @@ pub fn spawn_tile(report: impl Fn(TileResult) + Clone + Send + Sync + 'static) -
         state.work(job, context, &report)
     };
     let panicked = move |text: String| report_fault(TileResult::Failed(format!("a fault in the program ({text})")));
-    Worker::spawn("tile", 0, tile_image_worker::TileImageWorker::default, work, panicked).ok()
+    Worker::spawn("tile", Threads::AllInBackground, tile_image_worker::TileImageWorker::default, work, panicked).ok()
 }
 
 /// Starts the thread that plots lobes. After a panic, the plot is not updated; the image worker reports the cause.
 pub fn spawn_lobe(report: impl Fn(LobePlot) + Clone + Send + Sync + 'static) -> Option<Worker<LobeJob>> {
     let work =
         move |_: &mut (), job: LobeJob, context: &runner::JobContext<LobeJob>| lobe::work(&job, context, &report);
-    Worker::spawn("lobe", 0, || (), work, |_| {}).ok()
+    Worker::spawn("lobe", Threads::AllInBackground, || (), work, |_| {}).ok()
 }
 
 /// The threads that render the object: one drafts, one refines. Each receives every job.
@@ -92,11 +93,14 @@ impl PreviewWorkers {
             move |state: &mut image_worker::ImageWorker, job: ImageJob, context: &runner::JobContext<ImageJob>| {
                 state.refine(&job, context, &refine);
             };
-        let draft =
-            Worker::spawn("draft", 0, start.clone(), draft_work, move |text| draft_fault(ImageResult::Fault(text)))
-                .ok()?;
-        let refine =
-            Worker::spawn("refine", 0, start, refine_work, move |text| refine_fault(ImageResult::Fault(text))).ok()?;
+        let draft = Worker::spawn("draft", Threads::All, start.clone(), draft_work, move |text| {
+            draft_fault(ImageResult::Fault(text))
+        })
+        .ok()?;
+        let refine = Worker::spawn("refine", Threads::All, start, refine_work, move |text| {
+            refine_fault(ImageResult::Fault(text))
+        })
+        .ok()?;
         Some(Self { draft, refine, shared: workers_shared })
     }
 
@@ -142,7 +146,7 @@ pub fn spawn_thumbnail(report: impl Fn(Thumbnail) + Clone + Send + Sync + 'stati
         move |state: &mut thumbnail::ThumbnailWorker, job: ThumbnailJob, context: &runner::JobContext<ThumbnailJob>| {
             thumbnail::work(state, job, context, &report);
         };
-    Worker::spawn("thumbnails", 1, thumbnail::ThumbnailWorker::default, work, |_| {}).ok()
+    Worker::spawn("thumbnails", Threads::OneInBackground, thumbnail::ThumbnailWorker::default, work, |_| {}).ok()
 }
 
 /// Starts the thread that measures accuracy against time.
@@ -153,7 +157,7 @@ pub fn spawn_accuracy(report: impl Fn(AccuracyResult) + Clone + Send + Sync + 's
             state.work(&job, context, &report);
         };
     let panicked = move |text: String| report_fault(AccuracyResult::Failed(format!("a fault in the program ({text})")));
-    Worker::spawn("accuracy", 0, accuracy::AccuracyWorker::default, work, panicked).ok()
+    Worker::spawn("accuracy", Threads::AllInBackground, accuracy::AccuracyWorker::default, work, panicked).ok()
 }
 
 /// Starts the thread that searches settings for targets.
@@ -166,7 +170,7 @@ pub fn spawn_target(report: impl Fn(TargetResult) + Clone + Send + Sync + 'stati
         let news = TargetNews::Failed(format!("a fault in the program ({text})"));
         report_fault(TargetResult { serial: None, news });
     };
-    Worker::spawn("target", 0, || (), work, panicked).ok()
+    Worker::spawn("target", Threads::AllInBackground, || (), work, panicked).ok()
 }
 
 /// Starts the thread that reads folders of photographs.
@@ -178,7 +182,7 @@ pub fn spawn_capture(report: impl Fn(CaptureResult) + Clone + Send + Sync + 'sta
     let panicked = move |text: String| {
         report_fault(CaptureResult::Failed(None, format!("a fault in the program ({text})")));
     };
-    Worker::spawn("capture", 0, capture::CaptureWorker::default, work, panicked).ok()
+    Worker::spawn("capture", Threads::AllInBackground, capture::CaptureWorker::default, work, panicked).ok()
 }
 
 /// Starts the thread that measures the drivers of colour maps.
@@ -188,7 +192,7 @@ pub fn spawn_color_map(report: impl Fn(ColorMapResult) + Clone + Send + Sync + '
         color_map::work(state, &job, context, &report);
     };
     let panicked = move |text: String| report_fault(ColorMapResult::Failed(format!("a fault in the program ({text})")));
-    Worker::spawn("color map", 1, Pipeline::new, work, panicked).ok()
+    Worker::spawn("color map", Threads::OneInBackground, Pipeline::new, work, panicked).ok()
 }
 
 /// Starts the thread that plots the light through slabs.
@@ -199,7 +203,7 @@ pub fn spawn_slab_lobe(report: impl Fn(SlabLobeResult) + Clone + Send + Sync + '
     };
     let panicked = move |text: String| report_fault(SlabLobeResult::Failed(format!("a fault in the program ({text})")));
     // One thread, because the image of the slab takes the others.
-    Worker::spawn("slab lobe", 1, Pipeline::new, work, panicked).ok()
+    Worker::spawn("slab lobe", Threads::OneInBackground, Pipeline::new, work, panicked).ok()
 }
 
 /// Starts the thread that renders a scene by several methods.
@@ -210,7 +214,7 @@ pub fn spawn_methods(report: impl Fn(MethodsResult) + Clone + Send + Sync + 'sta
     };
     let panicked =
         move |text: String| report_fault(MethodsResult::Failed(u64::MAX, format!("a fault in the program ({text})")));
-    Worker::spawn("methods", 0, methods::MethodsWorker::default, work, panicked).ok()
+    Worker::spawn("methods", Threads::AllInBackground, methods::MethodsWorker::default, work, panicked).ok()
 }
 
 /// Starts the thread that writes exports.
@@ -224,7 +228,7 @@ pub fn spawn_export(
         export::work(&job, &cache, context, &report)
     };
     let panicked = move |text: String| report_fault(ExportResult::Failed(format!("a fault in the program ({text})")));
-    Worker::spawn("export", 0, || (), work, panicked).ok()
+    Worker::spawn("export", Threads::AllInBackground, || (), work, panicked).ok()
 }
 
 /// Starts the thread that writes recovery files.
@@ -233,7 +237,7 @@ pub fn spawn_autosave(done: impl Fn(Result<(), String>) + Clone + Send + Sync + 
     let work = move |_: &mut (), snapshot: Snapshot, _: &runner::JobContext<Snapshot>| {
         done(snapshot.write().map_err(|error| error.to_string()));
     };
-    Worker::spawn("autosave", 1, || (), work, move |text| report_fault(Err(text))).ok()
+    Worker::spawn("autosave", Threads::OneInBackground, || (), work, move |text| report_fault(Err(text))).ok()
 }
 
 #[cfg(test)]

@@ -7,7 +7,39 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use thread_priority::{ThreadPriority, set_current_thread_priority};
+
 use crate::base::{Cancel, Running, threads};
+
+/// The threads of a worker.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Threads {
+    /// One per core.
+    All,
+    /// One per core, which run while other threads leave the cores idle, and a little at other times.
+    AllInBackground,
+    /// A single one in the background.
+    OneInBackground,
+}
+
+/// Priority of threads in the background, of 99. On Linux, they get a tenth of the time of other threads (nice 11).
+const BACKGROUND: u8 = 20;
+
+impl Threads {
+    fn count(self) -> usize {
+        if self == Self::OneInBackground { 1 } else { threads::requested() }
+    }
+
+    /// Gives the calling thread its priority.
+    fn begin(self) {
+        if self != Self::All
+            && let Ok(priority) = BACKGROUND.try_into()
+        {
+            // A system that does not allow it runs the thread as any other.
+            let _ = set_current_thread_priority(ThreadPriority::Crossplatform(priority));
+        }
+    }
+}
 
 /// Context of a job: its cancel flag and the queue that it came from.
 pub struct JobContext<'a, J> {
@@ -53,11 +85,11 @@ pub struct Worker<J> {
 impl<J: Send + 'static> Worker<J> {
     /// Starts the thread.
     ///
-    /// `threads` is the size of its thread pool, 0 for all cores. `start` creates the state that jobs share, and does so
+    /// `threads` are those of its thread pool. `start` creates the state that jobs share, and does so
     /// again after a panic. `work` runs a job, and `panicked` receives the message of a panic.
     pub fn spawn<S: Send + 'static>(
         name: &str,
-        threads: usize,
+        threads: Threads,
         start: impl Fn() -> S + Send + 'static,
         work: impl Fn(&mut S, J, &JobContext<J>) + Send + Sync + 'static,
         panicked: impl Fn(String) + Send + 'static,
@@ -66,10 +98,11 @@ impl<J: Send + 'static> Worker<J> {
         let mailbox = Arc::new(Mailbox { state: Mutex::new(state), changed: Condvar::new() });
         let inside = mailbox.clone();
         let thread = std::thread::Builder::new().name(name.to_owned()).spawn(move || {
+            threads.begin();
             let mut state = start();
             // A separate pool, so that other workers do not block this one.
-            let threads = if threads == 0 { threads::requested() } else { threads };
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().ok();
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.count());
+            let pool = pool.start_handler(move |_| threads.begin()).build().ok();
             while let Some((job, cancel)) = next(&inside) {
                 let context = JobContext { cancel: &cancel, mailbox: &inside };
                 let work = || match &pool {
@@ -174,7 +207,7 @@ mod tests {
         let report_fault = sender.clone();
         let worker = Worker::spawn(
             "test",
-            1,
+            Threads::OneInBackground,
             || 0_u32,
             move |state: &mut u32, job: u32, _: &JobContext<u32>| {
                 *state += 1;
