@@ -339,6 +339,10 @@ impl Editor {
                 self.object.activity = Some(what);
             }
             ImageResult::Doing(..) => {}
+            ImageResult::Warnings(version, texts) if version > self.object.warnings_of => {
+                (self.object.warnings, self.object.warnings_of) = (texts, version);
+            }
+            ImageResult::Warnings(..) => {}
             ImageResult::Stated(brdf, error) => self.object.stated = Some((brdf, error)),
             ImageResult::Failed(version, _) if version < self.document.version() => {}
             ImageResult::Failed(version, text) => {
@@ -367,11 +371,12 @@ impl Editor {
         }
     }
 
-    /// Returns true until the final image of the last request is shown.
+    /// Returns true until the final image of the last request is shown, with its warnings.
     #[cfg(test)]
     pub fn is_busy(&self) -> bool {
         self.object.preview.as_ref().is_none_or(|preview| {
             preview.grade != super::worker::Grade::Final
+                || self.object.warnings_of != preview.version
                 || Some(preview.version) != self.object.requested.map(|(version, _)| version)
         })
     }

@@ -168,6 +168,7 @@ impl Editor {
             self.settings.add_recent(path);
             self.settings.save(self.folder.as_deref());
         }
+        (self.object.warnings, self.object.warnings_of) = (Vec::new(), self.document.version());
         let version = self.document.version() + document.version();
         self.document = document;
         // Version numbers continue, so that an image of the old document never matches the new one.
@@ -177,7 +178,6 @@ impl Editor {
         self.object.refined_effects = None;
         self.noted_left_out = false;
         self.messages.clear("left out");
-        self.object.warnings.clear();
         self.is_new = true;
         self.scene_changed();
     }

@@ -158,9 +158,8 @@ fn no_text_of_the_plan_names_a_flag_of_the_command_line() {
     let mut harness = of_size(deep("auto"), 1200.0, 800.0);
     let preview = editor(&mut harness).object.preview.clone().unwrap();
     let reasons = preview.effects.iter().map(|effect| effect.reason.as_str());
-    for text in
-        reasons.chain(preview.notes.iter().map(String::as_str)).chain(preview.warnings.iter().map(String::as_str))
-    {
+    let warnings = editor(&mut harness).object.warnings.clone();
+    for text in reasons.chain(preview.notes.iter().map(String::as_str)).chain(warnings.iter().map(String::as_str)) {
         assert!(!text.contains("--"), "{text}");
     }
 }

@@ -66,8 +66,9 @@ pub struct ObjectView {
     pub stated: Option<(Arc<EffectiveBrdf>, ErrorEstimate)>,
     /// The plan of the last refined image.
     pub refined_effects: Option<Vec<Effect>>,
-    /// The warnings of the last final image. Other images have none.
+    /// The warnings of the last final image that has any yet, and the version that it shows. Older ones are ignored.
     pub warnings: Vec<String>,
+    pub warnings_of: u64,
     /// Milliseconds of the stages from the last edit to its refined image.
     pub stages: Vec<(&'static str, f64)>,
     /// The version that could not be rendered.
@@ -103,7 +104,6 @@ impl ObjectView {
         }
         if preview.grade == Grade::Final {
             self.activity = None;
-            self.warnings.clone_from(&preview.warnings);
         }
         if preview.grade >= Grade::Refining {
             self.refined_effects = Some(preview.effects.clone());

@@ -88,7 +88,7 @@ impl ImageWorker {
         self.choose_backend(job, false);
         self.renderer.prepare(&self.pipeline, &job.loaded)?;
         if job.loaded.scene.slab.is_some() {
-            return self.render_slab(job, Grade::Draft, fitting(job.size, MAX_PIXELS[0]), cancel);
+            return Ok(self.render_slab(job, Grade::Draft, fitting(job.size, MAX_PIXELS[0]), cancel)?.0);
         }
         if let Some(outcome) = self.shared.known(&job.loaded) {
             let outcome = outcome.without_times();
@@ -195,16 +195,23 @@ impl ImageWorker {
             if !is_shown && let Some(preview) = self.retone(job)? {
                 report(ImageResult::Rendered(Box::new(preview)));
             }
-            let known = if job.loaded.scene.slab.is_none() { self.shared.known(&job.loaded) } else { None };
-            return known.map_or(Ok(()), |outcome| state_error(&outcome, context, report));
+            if job.loaded.scene.slab.is_some() {
+                let warnings = self.pipeline.slab(&job.loaded)?.health.warnings.clone();
+                report(ImageResult::Warnings(job.version, warnings));
+                return Ok(());
+            }
+            let known = self.shared.known(&job.loaded);
+            return known.map_or(Ok(()), |outcome| examine(job, &outcome, context, report));
         }
         self.pipeline.set_cancel(context.cancel.clone());
         self.choose_backend(job, true);
         if job.loaded.scene.slab.is_some() {
             report(ImageResult::Doing(job.version, "Refining the image"));
-            let preview = self.render_slab(job, Grade::Final, fitting(job.size, MAX_PIXELS[0]), context.cancel)?;
+            let (preview, warnings) =
+                self.render_slab(job, Grade::Final, fitting(job.size, MAX_PIXELS[0]), context.cancel)?;
             *lock(&self.shared.last) = Some((Box::new((*job.loaded).clone()), job.size, preview.clone()));
             report(ImageResult::Rendered(Box::new(preview)));
+            report(ImageResult::Warnings(job.version, warnings));
             return Ok(());
         }
         let mut outcome = match self.shared.known(&job.loaded) {
@@ -251,14 +258,11 @@ impl ImageWorker {
         let full = self.affordable(job, of_final, FINAL_MS);
         let mut preview = self.render(job, ShadedMaterial::Outcome(&outcome), of_final, full, 2, context.cancel)?;
         preview.grade = Grade::Final;
-        let health = outcome.health_unless(context.cancel)?;
-        preview.warnings.clone_from(&health.warnings);
-        preview.warnings.extend(dark::hint(health, &outcome.plan.effects));
         // An image that is only on the GPU is rendered again if its tone map changes.
         let last = preview.radiance.is_some().then(|| (Box::new((*job.loaded).clone()), job.size, preview.clone()));
         *lock(&self.shared.last) = last;
         report(ImageResult::Rendered(Box::new(preview)));
-        state_error(&outcome, context, report)
+        examine(job, &outcome, context, report)
     }
 
     /// Returns true if the job differs from the last final image only in exposure or tone map.
@@ -361,7 +365,6 @@ impl ImageWorker {
             camera: camera.clone(),
             distance: self.renderer.distance(&camera, size),
             notes,
-            warnings: Vec::new(),
             effects: plan.effects.clone(),
             preset: preset.name(),
         })
@@ -404,9 +407,17 @@ fn has_analytic_surface(loaded: &LoadedScene) -> bool {
     loaded.scene.color_map.as_ref().is_some_and(|map| map.surface.is_some())
 }
 
-/// Estimates the error of a BRDF and reports it, unless the user edits within a pause: the estimate takes some tenths of a
-/// second on all cores.
-fn state_error(outcome: &Outcome, context: &JobContext<ImageJob>, report: &dyn Fn(ImageResult)) -> Result<()> {
+/// Reports the warnings of a final image, and then the error of its BRDF, unless the user edits within a pause. The image does
+/// not wait for them: an estimate of the error takes some tenths of a second on all cores.
+fn examine(
+    job: &ImageJob,
+    outcome: &Outcome,
+    context: &JobContext<ImageJob>,
+    report: &dyn Fn(ImageResult),
+) -> Result<()> {
+    let health = outcome.health_unless(context.cancel)?;
+    let hint = dark::hint(health, &outcome.plan.effects);
+    report(ImageResult::Warnings(job.version, health.warnings.iter().cloned().chain(hint).collect()));
     if context.is_newest_after(STATED_PAUSE)
         && let Some(errors) = outcome.errors_unless(context.cancel)?
     {

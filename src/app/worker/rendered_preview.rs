@@ -81,8 +81,6 @@ pub struct RenderedPreview {
     /// Distance from the camera to the object, in the object's radii.
     pub distance: f32,
     pub notes: Vec<String>,
-    /// Warnings about the material, known once the image is final.
-    pub warnings: Vec<String>,
     pub effects: Vec<Effect>,
     /// Name of the preset that was used.
     pub preset: &'static str,
@@ -94,6 +92,8 @@ pub enum ImageResult {
     Rendered(Box<RenderedPreview>),
     /// The current work, for the status line.
     Doing(u64, &'static str),
+    /// Warnings about the material of a version, after its final image.
+    Warnings(u64, Vec<String>),
     /// The error that a BRDF states, after its image came to rest.
     Stated(Arc<EffectiveBrdf>, ErrorEstimate),
     Failed(u64, String),

@@ -15,14 +15,14 @@ use super::rendered_preview::{DisplayImage, Grade, ImageJob, RenderedPreview};
 use super::tone::color_image;
 
 impl ImageWorker {
-    /// Renders the slab of a job: a draft, or the image of the scene's own quality.
+    /// Renders the slab of a job: a draft, or the image of the scene's own quality. Returns the warnings of the slab as well.
     pub(super) fn render_slab(
         &mut self,
         job: &ImageJob,
         grade: Grade,
         size: [usize; 2],
         cancel: &Cancel,
-    ) -> Result<RenderedPreview> {
+    ) -> Result<(RenderedPreview, Vec<String>)> {
         let is_draft = grade == Grade::Draft;
         let loaded = if is_draft { as_preset(&job.loaded, Preset::Draft) } else { (*job.loaded).clone() };
         let outcome = self.pipeline.slab(&loaded)?;
@@ -35,7 +35,7 @@ impl ImageWorker {
         let shown = DisplayImage::Pixels(Arc::new(color_image(&image, &ToneMap::new(&camera)?)));
         let mut stages = outcome.times.clone();
         stages.extend([("g-buffer", times.gbuffer_ms), ("shading", times.shading_ms), ("tone", ms(start))]);
-        Ok(RenderedPreview {
+        let preview = RenderedPreview {
             version: job.version,
             grade,
             radiance: Some(Arc::new(image)),
@@ -49,9 +49,9 @@ impl ImageWorker {
             notes: [self.renderer.warnings(), scene.warnings(&render_scene)?].concat(),
             lit_object: Some(render_scene),
             camera,
-            warnings: if is_draft { Vec::new() } else { outcome.health.warnings.clone() },
             effects: outcome.effects.clone(),
             preset: Settings::of(&loaded.scene).preset.name(),
-        })
+        };
+        Ok((preview, outcome.health.warnings.clone()))
     }
 }
