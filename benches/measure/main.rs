@@ -86,7 +86,7 @@ const MEASUREMENTS: &[(&str, &str, Source)] = &[
     ("interpolation", "errors of low-rank factors by interpolation alone", Source::Here(interpolation)),
     (
         "interreflection",
-        "error and time of interreflection against path tracing: minutes",
+        "error and time of interreflection against path tracing: twenty minutes",
         Source::Here(interreflection),
     ),
     ("latency", "time from an edit in the editor to its images", in_lib("latency_from_a_slider")),
