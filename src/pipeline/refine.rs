@@ -143,11 +143,12 @@ impl Pipeline {
             let table = self.interreflection(surface, (&refined, refined != first), times)?;
             let done =
                 |close_to_bound| RefinedInterreflection { table: table.clone(), settings: refined, close_to_bound };
-            let Some(bound) = settings.refinement_bound() else { return Ok(done(false)) };
+            let bounds = settings.refinement_bound().zip(settings.bounced_bound());
+            let Some((of_all, bound)) = bounds else { return Ok(done(false)) };
             let start = Instant::now();
             let estimate = estimate_of_bounced(direct, (&table, base_area), values, (bound, QUICK_PART));
             add_time(times, "error_estimate", start);
-            close_to_bound |= estimate.excess(bound) > QUICK_PART;
+            close_to_bound |= estimate.excess(of_all) > QUICK_PART;
             let next = finer_interreflection([&first, &refined], &table, &estimate, bound);
             let Some(next) = next else { return Ok(done(close_to_bound)) };
             self.env.cancel.check()?;

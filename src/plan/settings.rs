@@ -304,6 +304,15 @@ impl Settings {
         self.error_bound().filter(|_| self.max_refined_facets.is_some())
     }
 
+    /// The bound to which refinement brings the part of the error that is due to light between facets. More rays take less time
+    /// than more facets, so that this light should not cause most of the error.
+    pub fn bounced_bound(&self) -> Option<ErrorBound> {
+        const MAX_REL_L2: f64 = 0.04;
+        let bound = self.refinement_bound()?;
+        let most = if self.preset == Preset::Draft { bound.rel_l2 } else { MAX_REL_L2 };
+        Some(ErrorBound { rel_l2: bound.rel_l2.min(most), ..bound })
+    }
+
     /// The part of the reflected light that may be missing because interreflection is left out.
     pub fn bounced_tolerance(&self) -> f64 {
         match self.preset {
