@@ -70,10 +70,13 @@ impl Editor {
         }
     }
 
+    /// Returns true if the final image of the document is shown and its warnings are known, so that no worker disturbs a
+    /// measurement.
     fn shows_final_image(&self) -> bool {
         let version = self.document.version();
         let preview = self.object.preview.as_deref();
-        preview.is_some_and(|preview| preview.grade == Grade::Final && preview.version == version)
+        let is_final = preview.is_some_and(|preview| preview.grade == Grade::Final && preview.version == version);
+        is_final && self.object.warnings_of == version
     }
 
     /// Submits the images of the scene's methods once its own image is final, and cancels those that are late.

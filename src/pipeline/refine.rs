@@ -1,5 +1,5 @@
 //! Refinement: facets, azimuths and the sharpness of shadows are raised until the estimated error of the direct sum is
-//! within the bound of the preset, and so are the rays and the directions of the light between facets.
+//! within the bound of the preset. Rays and directions of the light between facets follow a bound of their own.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -107,7 +107,7 @@ impl Pipeline {
 pub(super) struct RefinedInterreflection {
     pub table: Arc<InterreflectionTable>,
     pub settings: InterreflectionSettings,
-    /// True if the estimate was too close to the bound to rule refinement out.
+    /// True if this light alone brings the error so close to the bound of the preset that the result must be examined.
     pub close_to_bound: bool,
 }
 
@@ -128,7 +128,7 @@ impl RefinedInterreflection {
 
 impl Pipeline {
     /// The light between facets, with more rays and directions than those of `first` if its part of the estimated errors is
-    /// larger than the preset allows.
+    /// larger than [`Settings::bounced_bound`].
     pub(super) fn refined_interreflection(
         &self,
         surface: &VisibleSurface<'_>,
@@ -143,12 +143,12 @@ impl Pipeline {
             let table = self.interreflection(surface, (&refined, refined != first), times)?;
             let done =
                 |close_to_bound| RefinedInterreflection { table: table.clone(), settings: refined, close_to_bound };
-            let bounds = settings.refinement_bound().zip(settings.bounced_bound());
-            let Some((of_all, bound)) = bounds else { return Ok(done(false)) };
+            let Some(whole_bound) = settings.refinement_bound() else { return Ok(done(false)) };
+            let bound = settings.bounced_bound(whole_bound);
             let start = Instant::now();
             let estimate = estimate_of_bounced(direct, (&table, base_area), values, (bound, QUICK_PART));
             add_time(times, "error_estimate", start);
-            close_to_bound |= estimate.excess(of_all) > QUICK_PART;
+            close_to_bound |= estimate.excess(whole_bound) > QUICK_PART;
             let next = finer_interreflection([&first, &refined], &table, &estimate, bound);
             let Some(next) = next else { return Ok(done(close_to_bound)) };
             self.env.cancel.check()?;

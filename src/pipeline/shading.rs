@@ -40,7 +40,8 @@ const COARSE_TABLE_NODES: Range<usize> = 10_000..20_000;
 /// Factor by which a check that does not decide gets more pairs.
 const MORE_PAIRS: usize = 4;
 
-/// Tables of more nodes are first computed only where the pairs of the check read them, at about 10,000 nodes.
+/// Tables of more nodes are first computed only where the pairs of the check read them, at about 10,000 nodes; more if the
+/// check needs more pairs.
 const MIN_TRIAL_NODES: usize = 20_000;
 
 /// The effective BRDF as images read it.
@@ -143,7 +144,7 @@ impl Shading {
         if self.grids.is_empty() {
             return Ok(Found::new(self.exact.clone(), None));
         }
-        let mut check = Check::new(&self.exact, self.seed, IMAGE_CHECK_PAIRS);
+        let mut check = Check::new(&self.exact, self.seed);
         let (reused, has_failed) = self.reuse();
         if let Some((brdf, errors)) = self.strided_subset(&check) {
             return Ok(Found::new(Arc::new(brdf), Some(errors)));
@@ -152,14 +153,14 @@ impl Shading {
             return Ok(Found::new(self.exact.clone(), None));
         }
         match self.table(reused, &mut check, cancel, times)? {
-            (Some(table), errors) => self.with_bounced_columns(Found::new(Arc::new(table), errors), &check, cancel),
+            (Some(table), errors) => self.with_bounced_columns(Found::new(Arc::new(table), errors), &mut check, cancel),
             (None, errors) => Ok(Found::new(self.exact.clone(), errors)),
         }
     }
 
     /// Adds the light that facets send to each other to a table, so that images read one table and a GPU can read it.
     /// The table stays as it is if its error with this light exceeds the bound.
-    fn with_bounced_columns(&self, found: Found, check: &Check, cancel: &Cancel) -> Result<Found> {
+    fn with_bounced_columns(&self, found: Found, check: &mut Check, cancel: &Cancel) -> Result<Found> {
         let Representation::Interreflecting(direct, bounced) = &found.brdf.representation else { return Ok(found) };
         let Representation::Table(table) = &**direct else { return Ok(found) };
         let base_area = found.brdf.base_area;
@@ -170,7 +171,7 @@ impl Shading {
         };
         let representation = Representation::Table(table.plus_bounced(sum, cancel)?);
         let brdf = EffectiveBrdf { representation, base_area };
-        let errors = check.errors(&brdf).upper;
+        let errors = self.decided_errors(&brdf, check, cancel)?;
         if !self.is_close(errors) {
             return Ok(found);
         }
@@ -200,7 +201,7 @@ impl Shading {
         let first = self.grids.iter().position(|grid| Some(*grid) == known).unwrap_or(0);
         if let Some(table) = reused {
             let brdf = self.with_table(table);
-            let errors = self.decided_errors(&brdf, check);
+            let errors = self.decided_errors(&brdf, check, cancel)?;
             if self.is_close(errors) {
                 return Ok((Some(brdf), Some(errors)));
             }
@@ -209,7 +210,7 @@ impl Shading {
             let errors = match self.attempt(*grid, check, cancel, times)? {
                 Attempt::Table(table) => {
                     let brdf = self.with_table(table);
-                    let errors = self.decided_errors(&brdf, check);
+                    let errors = self.decided_errors(&brdf, check, cancel)?;
                     if self.is_close(errors) {
                         return Ok((Some(brdf), Some(errors)));
                     }
@@ -256,16 +257,20 @@ impl Shading {
             let mut enough = None;
             for facets in order {
                 let part = Nodes { facets, ..nodes };
-                let (trial, errors) = loop {
-                    let trial = self.tabulate(Nodes { read_by: Some(&check.pairs), ..part }, cancel, times)?;
-                    let Some(trial) = trial else { return Ok(Attempt::Impossible) };
+                // The last trial, and the number of pairs whose nodes it has.
+                let mut known: Option<(usize, ShadingTable)> = None;
+                let errors = loop {
+                    let of_known = known.as_ref().map(|(count, trial)| (&check.pairs[..*count], trial));
+                    let nodes = Nodes { read_by: Some(&check.pairs), known: of_known, ..part };
+                    let Some(trial) = self.tabulate(nodes, cancel, times)? else { return Ok(Attempt::Impossible) };
                     let errors = check.errors(&self.with_table(trial.clone()));
-                    if !self.asks_for_more(errors, check) {
-                        break (trial, errors.upper);
+                    known = Some((check.pairs.len(), trial));
+                    if !self.adds_pairs_if_undecided(errors, check, cancel)? {
+                        break errors.upper;
                     }
                 };
                 if self.is_close(errors) {
-                    enough = Some((part, trial));
+                    enough = known.map(|known| (part, known));
                     if facets.is_some() {
                         break;
                     }
@@ -273,13 +278,13 @@ impl Shading {
                     return Ok(Attempt::TooFar(errors));
                 }
             }
-            let Some((part, trial)) = enough else { return Ok(Attempt::Impossible) };
-            let rest = Nodes { known: Some((&check.pairs, &trial)), ..part };
+            let Some((part, (count, trial))) = enough else { return Ok(Attempt::Impossible) };
+            let rest = Nodes { known: Some((&check.pairs[..count], &trial)), ..part };
             return Ok(self.tabulate(rest, cancel, times)?.map_or(Attempt::Impossible, Attempt::Table));
         } else if facets > 0 && COARSE_TABLE_NODES.contains(&count) {
             let part = Nodes { facets: Some(facets / COARSE_SUBSET_DIVISOR), ..nodes };
             let Some(table) = self.tabulate(part, cancel, times)? else { return Ok(Attempt::Impossible) };
-            if self.is_close(check.errors(&self.with_table(table.clone())).upper) {
+            if self.is_close(self.decided_errors(&self.with_table(table.clone()), check, cancel)?) {
                 return Ok(Attempt::Table(table));
             }
         }
@@ -290,21 +295,23 @@ impl Shading {
         errors.rel_l2 <= self.tolerance.0 && errors.psnr_db >= self.tolerance.1
     }
 
-    /// Adds pairs to a check if its bound exceeds the tolerance, but the errors that it found do not: a few pairs had large
-    /// errors. Returns true if `check` has more pairs now.
-    fn asks_for_more(&self, errors: CheckedErrors, check: &mut Check) -> bool {
+    /// If the errors that a check found are within the tolerance, but their upper bound is not, adds pairs to it, once.
+    /// Returns true if it did.
+    fn adds_pairs_if_undecided(&self, errors: CheckedErrors, check: &mut Check, cancel: &Cancel) -> Result<bool> {
         let decides = self.is_close(errors.upper) || !self.is_close(errors.found);
         if decides || check.pairs.len() > IMAGE_CHECK_PAIRS {
-            return false;
+            return Ok(false);
         }
-        *check = Check::new(&self.exact, self.seed, MORE_PAIRS * IMAGE_CHECK_PAIRS);
-        true
+        cancel.check()?;
+        check.grow(&self.exact, MORE_PAIRS * IMAGE_CHECK_PAIRS);
+        Ok(true)
     }
 
     /// The upper bound of the errors, from more pairs if those of `check` do not decide.
-    fn decided_errors(&self, brdf: &EffectiveBrdf, check: &mut Check) -> Errors {
+    fn decided_errors(&self, brdf: &EffectiveBrdf, check: &mut Check, cancel: &Cancel) -> Result<Errors> {
         let errors = check.errors(brdf);
-        if self.asks_for_more(errors, check) { check.errors(brdf).upper } else { errors.upper }
+        let has_more = self.adds_pairs_if_undecided(errors, check, cancel)?;
+        Ok(if has_more { check.errors(brdf).upper } else { errors.upper })
     }
 
     /// A table on these nodes; `None` if no table can hold the sum.
@@ -404,6 +411,7 @@ impl Stage for Tabulate<'_> {
 
 /// Pairs of directions distributed as in images, and the BRDF there.
 struct Check {
+    seed: u64,
     pairs: Vec<Pair>,
     exact: Vec<Vec3>,
 }
@@ -416,20 +424,27 @@ struct CheckedErrors {
 }
 
 impl Check {
-    fn new(exact: &EffectiveBrdf, seed: u64, count: usize) -> Self {
-        let mut check = Self { pairs: image_pairs(count, seed ^ 0x7ab1e), exact: Vec::new() };
-        check.exact = check.values(exact);
+    fn new(exact: &EffectiveBrdf, seed: u64) -> Self {
+        let mut check = Self { seed: seed ^ 0x7ab1e, pairs: Vec::new(), exact: Vec::new() };
+        check.grow(exact, IMAGE_CHECK_PAIRS);
         check
     }
 
-    fn values(&self, brdf: &EffectiveBrdf) -> Vec<Vec3> {
-        self.pairs.par_iter().map(|pair| brdf.eval(pair.i, pair.o)).collect()
+    /// Adds pairs until there are `count`. Those before stay the first ones.
+    fn grow(&mut self, exact: &EffectiveBrdf, count: usize) {
+        let before = self.pairs.len();
+        self.pairs = image_pairs(count, self.seed);
+        self.exact.extend(values(exact, &self.pairs[before..]));
     }
 
     fn errors(&self, brdf: &EffectiveBrdf) -> CheckedErrors {
-        let values = self.values(brdf);
+        let values = values(brdf, &self.pairs);
         CheckedErrors { found: compare(&values, &self.exact), upper: upper_errors(&values, &self.exact) }
     }
+}
+
+fn values(brdf: &EffectiveBrdf, pairs: &[Pair]) -> Vec<Vec3> {
+    pairs.par_iter().map(|pair| brdf.eval(pair.i, pair.o)).collect()
 }
 
 #[cfg(test)]

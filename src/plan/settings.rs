@@ -304,13 +304,11 @@ impl Settings {
         self.error_bound().filter(|_| self.max_refined_facets.is_some())
     }
 
-    /// The bound to which refinement brings the part of the error that is due to light between facets. More rays take less time
-    /// than more facets, so that this light should not cause most of the error.
-    pub fn bounced_bound(&self) -> Option<ErrorBound> {
-        const MAX_REL_L2: f64 = 0.04;
-        let bound = self.refinement_bound()?;
-        let most = if self.preset == Preset::Draft { bound.rel_l2 } else { MAX_REL_L2 };
-        Some(ErrorBound { rel_l2: bound.rel_l2.min(most), ..bound })
+    /// The bound to which refinement brings the part of an error that is due to light between facets. At `standard` it is
+    /// smaller than that of the whole error, because more rays cost less time than more facets.
+    pub fn bounced_bound(&self, whole: ErrorBound) -> ErrorBound {
+        const AT_STANDARD: f64 = 0.04;
+        if self.preset == Preset::Standard { ErrorBound { rel_l2: AT_STANDARD, ..whole } } else { whole }
     }
 
     /// The part of the reflected light that may be missing because interreflection is left out.

@@ -105,10 +105,6 @@ fn latency(name: &str, edits: usize, edit: impl Fn(&mut Scene, usize)) -> Latenc
                 break;
             }
         }
-        // A hand moves again after the warnings of the final image.
-        while editor(&mut harness).is_busy() && start.elapsed() < MAX_WAIT {
-            frames.draw(&mut harness);
-        }
         // Some final images follow the draft directly.
         arrival_ms[1] = arrival_ms[1].or(arrival_ms[2]);
         times.push(arrival_ms);

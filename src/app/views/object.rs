@@ -66,8 +66,9 @@ pub struct ObjectView {
     pub stated: Option<(Arc<EffectiveBrdf>, ErrorEstimate)>,
     /// The plan of the last refined image.
     pub refined_effects: Option<Vec<Effect>>,
-    /// The warnings of the last final image that has any yet, and the version that it shows. Older ones are ignored.
+    /// The warnings of the newest final image whose warnings are known.
     pub warnings: Vec<String>,
+    /// The version of that image. Warnings of older versions are ignored.
     pub warnings_of: u64,
     /// Milliseconds of the stages from the last edit to its refined image.
     pub stages: Vec<(&'static str, f64)>,

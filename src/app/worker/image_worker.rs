@@ -18,7 +18,7 @@ use super::pixel_costs::{PixelCosts, Shading, fitting};
 use super::preview_renderer::{CloseUpTile, KnownPoints, PreviewRenderer, RenderRequest, ShadedMaterial};
 use super::rendered_preview::{DisplayImage, Grade, ImageJob, ImageResult, RenderedPreview};
 use super::runner::JobContext;
-use super::shared::{SharedState, SmallScale, lock, small_scale};
+use super::shared::{FinishedPreview, SharedState, SmallScale, lock, small_scale};
 use super::tone::color_image;
 
 /// Time of the final image [ms] below which no intermediate image delays it.
@@ -191,17 +191,21 @@ impl ImageWorker {
     ) -> Result<()> {
         if self.differs_only_in_tone(job) {
             // The draft showed the last final image, unless that image was finished after the draft.
-            let is_shown = lock(&self.shared.last).as_ref().is_none_or(|(.., last)| last.version == job.version);
+            let is_shown = lock(&self.shared.last).as_ref().is_none_or(|last| last.preview.version == job.version);
             if !is_shown && let Some(preview) = self.retone(job)? {
                 report(ImageResult::Rendered(Box::new(preview)));
             }
-            if job.loaded.scene.slab.is_some() {
-                let warnings = self.pipeline.slab(&job.loaded)?.health.warnings.clone();
-                report(ImageResult::Warnings(job.version, warnings));
-                return Ok(());
+            let warnings = lock(&self.shared.last).as_ref().and_then(|last| last.warnings.clone());
+            let known = if job.loaded.scene.slab.is_none() { self.shared.known(&job.loaded) } else { None };
+            match (warnings, known) {
+                (Some(warnings), known) => {
+                    report(ImageResult::Warnings(job.version, warnings));
+                    return known.map_or(Ok(()), |outcome| state_error(&outcome, context, report));
+                }
+                (None, Some(outcome)) => return self.examine(job, &outcome, context, report),
+                // The warnings were not computed before another material was.
+                (None, None) => {}
             }
-            let known = self.shared.known(&job.loaded);
-            return known.map_or(Ok(()), |outcome| examine(job, &outcome, context, report));
         }
         self.pipeline.set_cancel(context.cancel.clone());
         self.choose_backend(job, true);
@@ -209,7 +213,7 @@ impl ImageWorker {
             report(ImageResult::Doing(job.version, "Refining the image"));
             let (preview, warnings) =
                 self.render_slab(job, Grade::Final, fitting(job.size, MAX_PIXELS[0]), context.cancel)?;
-            *lock(&self.shared.last) = Some((Box::new((*job.loaded).clone()), job.size, preview.clone()));
+            *lock(&self.shared.last) = Some(finished(job, &preview, Some(warnings.clone())));
             report(ImageResult::Rendered(Box::new(preview)));
             report(ImageResult::Warnings(job.version, warnings));
             return Ok(());
@@ -259,15 +263,36 @@ impl ImageWorker {
         let mut preview = self.render(job, ShadedMaterial::Outcome(&outcome), of_final, full, 2, context.cancel)?;
         preview.grade = Grade::Final;
         // An image that is only on the GPU is rendered again if its tone map changes.
-        let last = preview.radiance.is_some().then(|| (Box::new((*job.loaded).clone()), job.size, preview.clone()));
-        *lock(&self.shared.last) = last;
+        *lock(&self.shared.last) = preview.radiance.is_some().then(|| finished(job, &preview, None));
         report(ImageResult::Rendered(Box::new(preview)));
-        examine(job, &outcome, context, report)
+        self.examine(job, &outcome, context, report)
+    }
+
+    /// Reports the warnings of a final image and the error of its BRDF, unless the user edits within a pause. The image does not
+    /// wait for them, because they take up to some tenths of a second on all cores.
+    fn examine(
+        &self,
+        job: &ImageJob,
+        outcome: &Outcome,
+        context: &JobContext<ImageJob>,
+        report: &dyn Fn(ImageResult),
+    ) -> Result<()> {
+        if !context.is_newest_after(PAUSE) {
+            return Ok(());
+        }
+        let health = outcome.health_unless(context.cancel)?;
+        let hint = dark::hint(health, &outcome.plan.effects);
+        let warnings: Vec<String> = health.warnings.iter().cloned().chain(hint).collect();
+        if let Some(last) = lock(&self.shared.last).as_mut().filter(|last| last.preview.version == job.version) {
+            last.warnings = Some(warnings.clone());
+        }
+        report(ImageResult::Warnings(job.version, warnings));
+        state_error(outcome, context, report)
     }
 
     /// Returns true if the job differs from the last final image only in exposure or tone map.
     fn differs_only_in_tone(&self, job: &ImageJob) -> bool {
-        lock(&self.shared.last).as_ref().is_some_and(|(last, size, _)| {
+        lock(&self.shared.last).as_ref().is_some_and(|FinishedPreview { loaded: last, size, .. }| {
             let (mut like_last, before) = ((*job.loaded).clone(), camera(last));
             let now = camera(&job.loaded);
             like_last.scene.camera.clone_from(&last.scene.camera);
@@ -283,7 +308,9 @@ impl ImageWorker {
             return Ok(None);
         }
         let start = Instant::now();
-        let Some((last, _, preview)) = &mut *lock(&self.shared.last) else { return Ok(None) };
+        let Some(FinishedPreview { loaded: last, preview, .. }) = &mut *lock(&self.shared.last) else {
+            return Ok(None);
+        };
         let Some(radiance) = &preview.radiance else { return Ok(None) };
         preview.image = DisplayImage::Pixels(Arc::new(color_image(radiance, &ToneMap::new(&camera(&job.loaded))?)));
         preview.version = job.version;
@@ -407,17 +434,13 @@ fn has_analytic_surface(loaded: &LoadedScene) -> bool {
     loaded.scene.color_map.as_ref().is_some_and(|map| map.surface.is_some())
 }
 
-/// Reports the warnings of a final image, and then the error of its BRDF, unless the user edits within a pause. The image does
-/// not wait for them: an estimate of the error takes some tenths of a second on all cores.
-fn examine(
-    job: &ImageJob,
-    outcome: &Outcome,
-    context: &JobContext<ImageJob>,
-    report: &dyn Fn(ImageResult),
-) -> Result<()> {
-    let health = outcome.health_unless(context.cancel)?;
-    let hint = dark::hint(health, &outcome.plan.effects);
-    report(ImageResult::Warnings(job.version, health.warnings.iter().cloned().chain(hint).collect()));
+fn finished(job: &ImageJob, preview: &RenderedPreview, warnings: Option<Vec<String>>) -> FinishedPreview {
+    FinishedPreview { loaded: Box::new((*job.loaded).clone()), size: job.size, preview: preview.clone(), warnings }
+}
+
+/// Estimates the error of a BRDF and reports it, unless the user edits within a pause: the estimate takes some tenths of a
+/// second on all cores.
+fn state_error(outcome: &Outcome, context: &JobContext<ImageJob>, report: &dyn Fn(ImageResult)) -> Result<()> {
     if context.is_newest_after(STATED_PAUSE)
         && let Some(errors) = outcome.errors_unless(context.cancel)?
     {

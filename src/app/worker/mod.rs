@@ -60,14 +60,14 @@ pub fn spawn_tile(report: impl Fn(TileResult) + Clone + Send + Sync + 'static) -
         state.work(job, context, &report)
     };
     let panicked = move |text: String| report_fault(TileResult::Failed(format!("a fault in the program ({text})")));
-    Worker::spawn("tile", Threads::AllInBackground, tile_image_worker::TileImageWorker::default, work, panicked).ok()
+    Worker::spawn("tile", Threads::All, tile_image_worker::TileImageWorker::default, work, panicked).ok()
 }
 
 /// Starts the thread that plots lobes. After a panic, the plot is not updated; the image worker reports the cause.
 pub fn spawn_lobe(report: impl Fn(LobePlot) + Clone + Send + Sync + 'static) -> Option<Worker<LobeJob>> {
     let work =
         move |_: &mut (), job: LobeJob, context: &runner::JobContext<LobeJob>| lobe::work(&job, context, &report);
-    Worker::spawn("lobe", Threads::AllInBackground, || (), work, |_| {}).ok()
+    Worker::spawn("lobe", Threads::All, || (), work, |_| {}).ok()
 }
 
 /// The threads that render the object: one drafts, one refines. Each receives every job.
@@ -192,7 +192,7 @@ pub fn spawn_color_map(report: impl Fn(ColorMapResult) + Clone + Send + Sync + '
         color_map::work(state, &job, context, &report);
     };
     let panicked = move |text: String| report_fault(ColorMapResult::Failed(format!("a fault in the program ({text})")));
-    Worker::spawn("color map", Threads::OneInBackground, Pipeline::new, work, panicked).ok()
+    Worker::spawn("color map", Threads::One, Pipeline::new, work, panicked).ok()
 }
 
 /// Starts the thread that plots the light through slabs.
@@ -203,7 +203,7 @@ pub fn spawn_slab_lobe(report: impl Fn(SlabLobeResult) + Clone + Send + Sync + '
     };
     let panicked = move |text: String| report_fault(SlabLobeResult::Failed(format!("a fault in the program ({text})")));
     // One thread, because the image of the slab takes the others.
-    Worker::spawn("slab lobe", Threads::OneInBackground, Pipeline::new, work, panicked).ok()
+    Worker::spawn("slab lobe", Threads::One, Pipeline::new, work, panicked).ok()
 }
 
 /// Starts the thread that renders a scene by several methods.
@@ -237,7 +237,7 @@ pub fn spawn_autosave(done: impl Fn(Result<(), String>) + Clone + Send + Sync + 
     let work = move |_: &mut (), snapshot: Snapshot, _: &runner::JobContext<Snapshot>| {
         done(snapshot.write().map_err(|error| error.to_string()));
     };
-    Worker::spawn("autosave", Threads::OneInBackground, || (), work, move |text| report_fault(Err(text))).ok()
+    Worker::spawn("autosave", Threads::One, || (), work, move |text| report_fault(Err(text))).ok()
 }
 
 #[cfg(test)]
@@ -246,6 +246,35 @@ mod tests {
     use std::time::Instant;
 
     use super::*;
+
+    #[test]
+    fn warnings_follow_every_final_image_also_after_an_edit_of_the_exposure() {
+        let (sender, results) = channel();
+        let workers = PreviewWorkers::spawn(&Cache::default(), move |result| drop(sender.send(result))).unwrap();
+        let settings = ["quality.preset=draft", "material.default.color=[3,3,3]", "camera.exposure_ev=0"];
+        let loaded = crate::scene::open("fig5a_isotropic", &settings.map(str::to_owned)).unwrap();
+        let mut found = Vec::new();
+        // The second job is the same, the others change the exposure, the last one before the warnings of the one before.
+        for (version, exposure) in [(1, 0.0), (2, 0.0), (3, 1.0), (4, 2.0), (5, 3.0)] {
+            let mut loaded = loaded.clone();
+            loaded.scene.camera.get_or_insert_default().exposure_ev = exposure;
+            let loaded = Arc::new(loaded);
+            workers.submit(ImageJob { version, loaded, size: [48, 48], submitted: Instant::now() });
+            if version == 4 {
+                continue;
+            }
+            found.push(loop {
+                match results.recv_timeout(Duration::from_secs(60)).unwrap() {
+                    ImageResult::Warnings(of, texts) if of == version => break texts,
+                    ImageResult::Failed(_, text) | ImageResult::Fault(text) => panic!("{text}"),
+                    _ => {}
+                }
+            });
+        }
+        assert!(found.len() == 4 && !found[0].is_empty(), "{found:?}");
+        assert!(found.iter().all(|texts| *texts == found[0]), "{found:?}");
+        workers.finish(Duration::from_secs(4));
+    }
 
     #[test]
     fn a_scene_that_is_saved_while_its_final_image_is_computed_shows_that_image() {

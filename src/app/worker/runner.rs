@@ -16,23 +16,25 @@ use crate::base::{Cancel, Running, threads};
 pub enum Threads {
     /// One per core.
     All,
-    /// One per core, which run while other threads leave the cores idle, and a little at other times.
+    /// One per core, with a lower priority: they run while other threads leave the cores idle, and little at other times.
     AllInBackground,
-    /// A single one in the background.
+    One,
+    /// A single one with a lower priority.
     OneInBackground,
 }
 
-/// Priority of threads in the background, of 99. On Linux, they get a tenth of the time of other threads (nice 11).
+/// The lower priority, on a scale from 0 to 99. On Linux, such a thread gets about a tenth of a core that another one uses
+/// (nice 11).
 const BACKGROUND: u8 = 20;
 
 impl Threads {
     fn count(self) -> usize {
-        if self == Self::OneInBackground { 1 } else { threads::requested() }
+        if matches!(self, Self::One | Self::OneInBackground) { 1 } else { threads::requested() }
     }
 
     /// Gives the calling thread its priority.
-    fn begin(self) {
-        if self != Self::All
+    fn set_priority(self) {
+        if matches!(self, Self::AllInBackground | Self::OneInBackground)
             && let Ok(priority) = BACKGROUND.try_into()
         {
             // A system that does not allow it runs the thread as any other.
@@ -85,7 +87,7 @@ pub struct Worker<J> {
 impl<J: Send + 'static> Worker<J> {
     /// Starts the thread.
     ///
-    /// `threads` are those of its thread pool. `start` creates the state that jobs share, and does so
+    /// `threads` are those of its thread pool, whose priority the thread has as well. `start` creates the state that jobs share, and does so
     /// again after a panic. `work` runs a job, and `panicked` receives the message of a panic.
     pub fn spawn<S: Send + 'static>(
         name: &str,
@@ -98,11 +100,11 @@ impl<J: Send + 'static> Worker<J> {
         let mailbox = Arc::new(Mailbox { state: Mutex::new(state), changed: Condvar::new() });
         let inside = mailbox.clone();
         let thread = std::thread::Builder::new().name(name.to_owned()).spawn(move || {
-            threads.begin();
+            threads.set_priority();
             let mut state = start();
             // A separate pool, so that other workers do not block this one.
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.count());
-            let pool = pool.start_handler(move |_| threads.begin()).build().ok();
+            let pool = pool.start_handler(move |_| threads.set_priority()).build().ok();
             while let Some((job, cancel)) = next(&inside) {
                 let context = JobContext { cancel: &cancel, mailbox: &inside };
                 let work = || match &pool {

@@ -15,8 +15,14 @@ use super::screen::Screen;
 /// Inputs of an effective BRDF.
 pub type SmallScale = (Tile, Option<ColorMap>, Vec<MaterialSpec>, Quality, Effects, PathBuf, Painted);
 
-/// A final image with its scene and size.
-pub type FinishedPreview = (Box<LoadedScene>, [usize; 2], RenderedPreview);
+/// A final image with its scene and the size that was asked for.
+pub struct FinishedPreview {
+    pub loaded: Box<LoadedScene>,
+    pub size: [usize; 2],
+    pub preview: RenderedPreview,
+    /// Warnings about the material, once they are known.
+    pub warnings: Option<Vec<String>>,
+}
 
 /// State of both workers: the last BRDF at a scene's own quality, the last final image, and the available GPUs.
 #[derive(Default)]
