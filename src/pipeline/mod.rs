@@ -20,6 +20,7 @@ mod outcome;
 mod reference;
 mod refine;
 mod shading;
+mod shading_check;
 mod slab;
 mod slab_values;
 mod stage;

@@ -6,9 +6,9 @@ use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 
 use super::Env;
+use super::shading_check::{Check, CheckedErrors};
 use super::stage::{Codec, Keyed, Stage, StageTimes, elapsed_ms, lock, run_without_memo};
 use super::stages::TileShape;
 use crate::base::{Cancel, Error, Result};
@@ -16,7 +16,7 @@ use crate::cache::{Cache, Key, KeyBuilder};
 use crate::effective::{Direct, EffectiveBrdf, Interpolation, Nodes, Representation, ShadingTable, TableContent};
 use crate::geometry::mirror_planes;
 use crate::math::directions::HemispherePairGrid;
-use crate::metrics::{Errors, Pair, compare, image_pairs, upper_errors};
+use crate::metrics::Errors;
 use crate::plan::{IMAGE_CHECK_PAIRS, Settings};
 use crate::scene::Switch;
 use crate::visibility::Visibility;
@@ -407,44 +407,6 @@ impl Stage for Tabulate<'_> {
     fn accepts(&self, content: &TableContent) -> bool {
         ShadingTable::from_content(self.direct, self.nodes.grid, content.clone()).is_some()
     }
-}
-
-/// Pairs of directions distributed as in images, and the BRDF there.
-struct Check {
-    seed: u64,
-    pairs: Vec<Pair>,
-    exact: Vec<Vec3>,
-}
-
-/// Errors that a check found, and their upper bound for similar pairs.
-#[derive(Debug, Clone, Copy)]
-struct CheckedErrors {
-    found: Errors,
-    upper: Errors,
-}
-
-impl Check {
-    fn new(exact: &EffectiveBrdf, seed: u64) -> Self {
-        let mut check = Self { seed: seed ^ 0x7ab1e, pairs: Vec::new(), exact: Vec::new() };
-        check.grow(exact, IMAGE_CHECK_PAIRS);
-        check
-    }
-
-    /// Adds pairs until there are `count`. Those before stay the first ones.
-    fn grow(&mut self, exact: &EffectiveBrdf, count: usize) {
-        let before = self.pairs.len();
-        self.pairs = image_pairs(count, self.seed);
-        self.exact.extend(values(exact, &self.pairs[before..]));
-    }
-
-    fn errors(&self, brdf: &EffectiveBrdf) -> CheckedErrors {
-        let values = values(brdf, &self.pairs);
-        CheckedErrors { found: compare(&values, &self.exact), upper: upper_errors(&values, &self.exact) }
-    }
-}
-
-fn values(brdf: &EffectiveBrdf, pairs: &[Pair]) -> Vec<Vec3> {
-    pairs.par_iter().map(|pair| brdf.eval(pair.i, pair.o)).collect()
 }
 
 #[cfg(test)]

@@ -11,14 +11,14 @@ use crate::render::image::tone_map::ToneMap;
 use crate::render::tile_view::TileScene;
 use crate::scene::{Camera, LoadedScene};
 
-use super::dark;
 use super::draft_detail::{DRAFT_MS, DraftDetail, KEPT_SURFACE_MS};
+use super::finished_image::{finished, state_error};
 use super::gpu_drafts::{GpuDrafts, as_preset};
 use super::pixel_costs::{PixelCosts, Shading, fitting};
 use super::preview_renderer::{CloseUpTile, KnownPoints, PreviewRenderer, RenderRequest, ShadedMaterial};
 use super::rendered_preview::{DisplayImage, Grade, ImageJob, ImageResult, RenderedPreview};
 use super::runner::JobContext;
-use super::shared::{FinishedPreview, SharedState, SmallScale, lock, small_scale};
+use super::shared::{SharedState, SmallScale, lock, small_scale};
 use super::tone::color_image;
 
 /// Time of the final image [ms] below which no intermediate image delays it.
@@ -32,10 +32,7 @@ const DRAFT_CANCEL_DELAY: Duration = Duration::from_millis(700);
 /// Interval at which refinement checks whether the draft has ended.
 const POLL: Duration = Duration::from_millis(5);
 /// Time without a new edit after which refinement begins.
-const PAUSE: Duration = Duration::from_millis(60);
-/// Time without a new edit after the final image, after which its error is estimated.
-const STATED_PAUSE: Duration = Duration::from_millis(400);
-
+pub(super) const PAUSE: Duration = Duration::from_millis(60);
 /// Time of a stage [ms] below which it is not stated.
 const MIN_STAGE_MS: f64 = 0.005;
 /// Stage that computes visibility and facet sum on the GPU.
@@ -43,7 +40,7 @@ const SUM_STAGE: &str = "visibility and product";
 
 /// The state of a worker that renders the object. One worker drafts, another one refines.
 pub struct ImageWorker {
-    shared: Arc<SharedState>,
+    pub(super) shared: Arc<SharedState>,
     pub(super) pipeline: Pipeline,
     pub(super) renderer: PreviewRenderer,
     /// The tile, while the camera is so close that the tile itself is visible.
@@ -268,58 +265,6 @@ impl ImageWorker {
         self.examine(job, &outcome, context, report)
     }
 
-    /// Reports the warnings of a final image and the error of its BRDF, unless the user edits within a pause. The image does not
-    /// wait for them, because they take up to some tenths of a second on all cores.
-    fn examine(
-        &self,
-        job: &ImageJob,
-        outcome: &Outcome,
-        context: &JobContext<ImageJob>,
-        report: &dyn Fn(ImageResult),
-    ) -> Result<()> {
-        if !context.is_newest_after(PAUSE) {
-            return Ok(());
-        }
-        let health = outcome.health_unless(context.cancel)?;
-        let hint = dark::hint(health, &outcome.plan.effects);
-        let warnings: Vec<String> = health.warnings.iter().cloned().chain(hint).collect();
-        if let Some(last) = lock(&self.shared.last).as_mut().filter(|last| last.preview.version == job.version) {
-            last.warnings = Some(warnings.clone());
-        }
-        report(ImageResult::Warnings(job.version, warnings));
-        state_error(outcome, context, report)
-    }
-
-    /// Returns true if the job differs from the last final image only in exposure or tone map.
-    fn differs_only_in_tone(&self, job: &ImageJob) -> bool {
-        lock(&self.shared.last).as_ref().is_some_and(|FinishedPreview { loaded: last, size, .. }| {
-            let (mut like_last, before) = ((*job.loaded).clone(), camera(last));
-            let now = camera(&job.loaded);
-            like_last.scene.camera.clone_from(&last.scene.camera);
-            like_last.name.clone_from(&last.name);
-            let tones = Camera { exposure_ev: before.exposure_ev, tone_map: before.tone_map.clone(), ..now };
-            tones == before && like_last == **last && *size == job.size
-        })
-    }
-
-    /// The last final image with a new tone map, if nothing else changed.
-    fn retone(&mut self, job: &ImageJob) -> Result<Option<RenderedPreview>> {
-        if !self.differs_only_in_tone(job) {
-            return Ok(None);
-        }
-        let start = Instant::now();
-        let Some(FinishedPreview { loaded: last, preview, .. }) = &mut *lock(&self.shared.last) else {
-            return Ok(None);
-        };
-        let Some(radiance) = &preview.radiance else { return Ok(None) };
-        preview.image = DisplayImage::Pixels(Arc::new(color_image(radiance, &ToneMap::new(&camera(&job.loaded))?)));
-        preview.version = job.version;
-        preview.stages = vec![("tone", ms(start))];
-        preview.latency_ms = ms(job.submitted);
-        last.scene.camera.clone_from(&job.loaded.scene.camera);
-        Ok(Some(preview.clone()))
-    }
-
     fn render(
         &mut self,
         job: &ImageJob,
@@ -432,21 +377,6 @@ impl ImageWorker {
 /// Returns true if images show an analytic surface at every distance, and `f̄` at none.
 fn has_analytic_surface(loaded: &LoadedScene) -> bool {
     loaded.scene.color_map.as_ref().is_some_and(|map| map.surface.is_some())
-}
-
-fn finished(job: &ImageJob, preview: &RenderedPreview, warnings: Option<Vec<String>>) -> FinishedPreview {
-    FinishedPreview { loaded: Box::new((*job.loaded).clone()), size: job.size, preview: preview.clone(), warnings }
-}
-
-/// Estimates the error of a BRDF and reports it, unless the user edits within a pause: the estimate takes some tenths of a
-/// second on all cores.
-fn state_error(outcome: &Outcome, context: &JobContext<ImageJob>, report: &dyn Fn(ImageResult)) -> Result<()> {
-    if context.is_newest_after(STATED_PAUSE)
-        && let Some(errors) = outcome.errors_unless(context.cancel)?
-    {
-        report(ImageResult::Stated(outcome.brdf.clone(), errors.estimate()));
-    }
-    Ok(())
 }
 
 /// Reports an error; a cancelled job reports nothing.

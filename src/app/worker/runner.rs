@@ -87,8 +87,8 @@ pub struct Worker<J> {
 impl<J: Send + 'static> Worker<J> {
     /// Starts the thread.
     ///
-    /// `threads` are those of its thread pool, whose priority the thread has as well. `start` creates the state that jobs share, and does so
-    /// again after a panic. `work` runs a job, and `panicked` receives the message of a panic.
+    /// `threads` are those of its thread pool, whose priority the thread has as well. `start` creates the state that jobs
+    /// share, and does so again after a panic. `work` runs a job, and `panicked` receives the message of a panic.
     pub fn spawn<S: Send + 'static>(
         name: &str,
         threads: Threads,
