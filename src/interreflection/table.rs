@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::math::directions::{CubicTaps, ReducedGrid, RingTaps, Tap};
-use crate::math::simd;
+use crate::math::simd::{self, LANES, azimuth_and_polar_angle, multiversion};
 
 /// Mean square of the error of a cubic between nodes, relative to that in the middle, for lobes of some steps' width.
 const MEAN_OF_STEP: f64 = 0.2;
@@ -100,33 +100,22 @@ impl InterreflectionTable {
             row = vec![0.0; 3 * plane_length(self.grid)];
             simd::gathered_row(&self.rows, &to_viewer, &mut row);
         }
-        for (k, &i) in lights.iter().enumerate() {
-            let mut value = Vec3::ZERO;
-            if i.z > 0.0 && o.z > 0.0 {
-                let to_light = self.grid.cubic_taps(i);
-                value = match row.is_empty() {
-                    true => self.along_light(&to_light, |at| self.along_viewer(&to_viewer, at)),
-                    false => self.along_light(&to_light, |at| run(&row, at)),
-                };
+        for (chunk, lights) in lights.chunks(LANES).enumerate() {
+            let mut values = [Vec3::ZERO; LANES];
+            if o.z > 0.0 && !row.is_empty() {
+                along_lights(&self.grid, &row, lights, &mut values);
+            } else if o.z > 0.0 {
+                for (i, value) in lights.iter().zip(&mut values).filter(|(i, _)| i.z > 0.0) {
+                    let to_light = self.grid.cubic_taps(*i);
+                    *value = along_light(&self.grid, &to_light, |at| self.along_viewer(&to_viewer, at));
+                }
             }
-            // A cubic may be below zero; no reflected light is.
-            out(k, value.max(Vec3::ZERO).as_dvec3());
+            values
+                .iter()
+                .take(lights.len())
+                .enumerate()
+                .for_each(|(k, value)| out(chunk * LANES + k, value.as_dvec3()));
         }
-    }
-
-    /// The sum over the taps of a light; `at` returns four columns of a row, from an index on.
-    #[inline(always)]
-    fn along_light(&self, taps: &CubicTaps, at: impl Fn(usize) -> [f32; 4]) -> Vec3 {
-        let plane = plane_length(self.grid);
-        let mut sums = [[0.0_f32; 4]; 3];
-        for RingTaps { ring, first, weights } in taps.rings {
-            let start = self.grid.first_node(ring) + REPEATED * ring + first;
-            for (channel, sums) in sums.iter_mut().enumerate() {
-                let values = at(channel * plane + start);
-                (0..4).for_each(|k| sums[k] += weights[k] * values[k]);
-            }
-        }
-        Vec3::from(sums.map(|[a, b, c, d]| (a + b) + (c + d)))
     }
 
     /// Four columns of [`simd::gathered_row`], with the same bits.
@@ -138,6 +127,37 @@ impl InterreflectionTable {
         }
         sums
     }
+}
+
+multiversion! {
+    /// Writes the sum over the taps of each light, at most [`LANES`] of them, in a row.
+    pub fn along_lights(grid: &ReducedGrid, row: &[f32], lights: &[Vec3], out: &mut [Vec3; LANES]) {
+        let mut angles = [(0.0, 0.0); LANES];
+        for (angles, light) in angles.iter_mut().zip(lights) {
+            *angles = azimuth_and_polar_angle(*light);
+        }
+        for ((out, light), angles) in out.iter_mut().zip(lights).zip(angles) {
+            if light.z > 0.0 {
+                *out = along_light(grid, &grid.cubic_taps_at(angles), |at| run(row, at));
+            }
+        }
+    }
+}
+
+/// The sum over the taps of a light; `at` returns four columns of a row, from an index on. A cubic may be below zero; no
+/// reflected light is.
+#[inline(always)]
+fn along_light(grid: &ReducedGrid, taps: &CubicTaps, at: impl Fn(usize) -> [f32; 4]) -> Vec3 {
+    let plane = plane_length(*grid);
+    let mut sums = [[0.0_f32; 4]; 3];
+    for RingTaps { ring, first, weights } in taps.rings {
+        let start = grid.first_node(ring) + REPEATED * ring + first;
+        for (channel, sums) in sums.iter_mut().enumerate() {
+            let values = at(channel * plane + start);
+            (0..4).for_each(|k| sums[k] += weights[k] * values[k]);
+        }
+    }
+    Vec3::from(sums.map(|[a, b, c, d]| (a + b) + (c + d))).max(Vec3::ZERO)
 }
 
 /// Number of values of a channel in a row.

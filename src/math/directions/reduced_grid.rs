@@ -69,11 +69,13 @@ impl ReducedGrid {
     }
 
     /// The number of the first node of a ring.
+    #[inline(always)]
     pub fn first_node(&self, ring: usize) -> usize {
         usize::from(self.starts[ring])
     }
 
     /// Number of azimuths of a ring.
+    #[inline(always)]
     pub fn azimuths_of(&self, ring: usize) -> usize {
         self.first_node(ring + 1) - self.first_node(ring)
     }
@@ -100,7 +102,12 @@ impl ReducedGrid {
     /// The taps of a cubic (Catmull and Rom 1974) in the elevation and in the azimuth; weights sum to one, and some are
     /// negative.
     pub fn cubic_taps(&self, direction: Vec3) -> CubicTaps {
-        let (turns, theta) = azimuth_and_polar_angle(direction);
+        self.cubic_taps_at(azimuth_and_polar_angle(direction))
+    }
+
+    /// The taps of a direction with this azimuth in turns and polar angle.
+    #[inline(always)]
+    pub(crate) fn cubic_taps_at(&self, (turns, theta): (f32, f32)) -> CubicTaps {
         let step = FRAC_PI_2 / self.rings as f32;
         let at = (theta / step - 0.5).clamp(-0.5, self.rings as f32);
         let lower = (at.floor() as i32).min(self.rings as i32 - 1);
@@ -121,6 +128,7 @@ impl ReducedGrid {
     }
 
     /// The taps of a cubic along a ring at an azimuth in turns, times a weight. Ring -1 is ring 0, rotated by half a turn.
+    #[inline(always)]
     pub fn ring_taps(&self, ring: i32, turns: f32, weight: f32) -> RingTaps {
         let (ring, turns) = if ring < 0 { ((-1 - ring) as usize, turns + 0.5) } else { (ring as usize, turns) };
         let count = self.azimuths_of(ring);

@@ -87,6 +87,7 @@ multiversion! {
 }
 
 /// Azimuth in turns and cosine of the elevation of one direction, with the same bits as in [`LightPairs`].
+#[inline(always)]
 pub fn azimuth_and_cosine(d: Vec3) -> (f32, f32) {
     let half = upper_angle(d.y.abs(), d.x);
     let azimuth = ((if d.y < 0.0 { TAU - half } else { half }) * (1.0 / TAU)).min(1.0);
@@ -94,6 +95,7 @@ pub fn azimuth_and_cosine(d: Vec3) -> (f32, f32) {
 }
 
 /// Azimuth in turns, as [`azimuth_and_cosine`], and polar angle in `[0, π]` of one direction.
+#[inline(always)]
 pub fn azimuth_and_polar_angle(d: Vec3) -> (f32, f32) {
     let (azimuth, sine) = azimuth_and_cosine(d);
     (azimuth, upper_angle(sine, d.z))

@@ -15,13 +15,14 @@ const BLOCK: usize = 16;
 const STRIDE: usize = BLOCK + 1;
 /// Pixels per side of the largest squares.
 const LARGEST: usize = 8;
-/// Those of the smallest ones whose quarters are interpolated.
+/// Those of the smallest ones that are examined. Their quarters are interpolated, and so are smooth squares of half this size
+/// for light that facets send to each other.
 const SMALLEST: usize = 4;
 /// Bounds the angles of normals and tangents to those in the middle of a square: the cosine of 4°.
 const MIN_COSINE: f32 = 0.997_56;
-/// Bounds the angles between the points of a pixel that share light that facets send to each other: the cosine of 3°. The
-/// tables of this light have steps of 5.6° and more.
-const MIN_SHARED_COSINE: f32 = 0.998_63;
+/// Bounds the angles between points that share the light that facets send to each other: the cosine of 2°. The tables of this
+/// light have steps of 5.6° and more.
+const SHARED_COSINE: f32 = 0.999_39;
 /// Cosine of the angle between a normal and the lowest source that another pixel of the square may see: 8° below the horizon.
 const LOWEST_COSINE: f32 = -0.139_2;
 /// The error allowed in a square, as a multiple of the tolerance. Its quarters have smaller errors.
@@ -62,6 +63,8 @@ struct Block<'a> {
     points: Vec<u32>,
     /// Points of pixels at edges, which have several.
     edges: Vec<u32>,
+    /// Points that are not interpolated.
+    rest: Vec<u32>,
     /// Where a pixel's part of `values` begins.
     known: Vec<u32>,
     /// Light of each source without shadows, which can end abruptly at the horizon. Sources little below it have the light of the
@@ -99,6 +102,7 @@ impl<'a> Block<'a> {
             tolerance,
             points,
             edges,
+            rest: Vec::new(),
             known: Vec::new(),
             values: Vec::new(),
             is_bounced_missing: false,
@@ -111,38 +115,55 @@ impl<'a> Block<'a> {
         self.known = vec![NONE; STRIDE * STRIDE];
         self.values.clear();
         self.is_bounced_missing = false;
-        let mut last: Option<(u32, Vec3)> = None;
-        for k in 0..self.edges.len() {
-            let point = self.edges[k];
-            let shared = last.filter(|(last, _)| part == Part::Bounced && self.are_alike(*last, point));
-            let (from, light) = shared.unwrap_or_else(|| (point, self.lit(part, point)));
-            last = Some((from, light));
-            self.out.push((point, light));
-        }
+        self.rest.clone_from(&self.edges);
         for y in (0..BLOCK).step_by(LARGEST) {
             for x in (0..BLOCK).step_by(LARGEST) {
                 self.add_square(part, y * STRIDE + x, LARGEST);
             }
         }
+        let all = std::mem::take(&mut self.rest);
+        let mut rest = &all[..];
+        while let Some((&first, others)) = rest.split_first() {
+            let is_shared = |point: &&u32| part == Part::Bounced && self.are_alike(first, **point);
+            let (points, remaining) = rest.split_at(1 + others.iter().take_while(is_shared).count());
+            self.add_alike(part, points);
+            rest = remaining;
+        }
+        self.rest = all;
         self.is_bounced_missing
     }
 
-    /// Returns true if two points of a pixel are on one smooth surface and in the same light.
+    /// Returns true if the light that facets send to each other differs at two points by their shadows alone.
     fn are_alike(&self, a: u32, b: u32) -> bool {
         let (a, b, points) = (a as usize, b as usize, self.shading.points);
-        points.pixels[a] == points.pixels[b]
-            && points.normals[a].dot(points.normals[b]) >= MIN_SHARED_COSINE
-            && points.tangents[a].dot(points.tangents[b]) >= MIN_SHARED_COSINE
-            && self.shading.visibility.is_same(a, b)
+        points.normals[a].dot(points.normals[b]) >= SHARED_COSINE
+            && points.tangents[a].dot(points.tangents[b]) >= SHARED_COSINE
+    }
+
+    /// Adds the light of points that are alike.
+    fn add_alike(&mut self, part: Part, points: &[u32]) {
+        let Some((&first, others)) = points.split_first() else { return };
+        let visibility = &self.shading.visibility;
+        if others.iter().all(|point| visibility.is_same(first as usize, *point as usize)) {
+            let light = self.lit(part, first);
+            return self.out.extend(points.iter().map(|point| (*point, light)));
+        }
+        let values = self.values_at(part, first);
+        for &point in points {
+            let light = self.sum(values, point).unwrap_or_else(|| self.lit(part, point));
+            self.out.push((point, light));
+        }
     }
 
     /// Adds the light of a square, interpolated if that is close enough, else that of its quarters.
     fn add_square(&mut self, part: Part, first: usize, side: usize) {
         if side == 1 {
             let point = self.points[first];
-            if point != NONE {
+            if self.known[first] != NONE {
                 let light = self.at(part, first);
                 self.out.push((point, light));
+            } else if point != NONE {
+                self.rest.push(point);
             }
             return;
         }
@@ -151,9 +172,13 @@ impl<'a> Block<'a> {
             return;
         }
         let begin = self.out.len();
-        if !self.is_close(part, first, side)
-            || !quarters(first, side).iter().all(|quarter| self.fill(part, *quarter, side / 2))
-        {
+        let is_filled = if side < SMALLEST {
+            part == Part::Bounced && self.is_smooth(first, side) && self.fill(part, first, side)
+        } else {
+            self.is_close(part, first, side)
+                && quarters(first, side).iter().all(|quarter| self.fill(part, *quarter, side / 2))
+        };
+        if !is_filled {
             self.out.truncate(begin);
             quarters(first, side).iter().for_each(|quarter| self.add_square(part, *quarter, side / 2));
         }
@@ -162,7 +187,7 @@ impl<'a> Block<'a> {
     /// Returns true if a square is smooth, and the light between its corners is close to that in its middle and in the middles
     /// of its sides. All of them are then known with all sources, so that its quarters can be interpolated.
     fn is_close(&mut self, part: Part, first: usize, side: usize) -> bool {
-        if side < SMALLEST || !self.is_smooth(first, side) {
+        if !self.is_smooth(first, side) {
             return false;
         }
         let (corners, half) = (self.corners(part, first, side), side / 2);
@@ -243,17 +268,22 @@ impl<'a> Block<'a> {
     /// Returns where the values of a pixel begin.
     fn values_of(&mut self, part: Part, pixel: usize) -> usize {
         if self.known[pixel] == NONE {
-            let (point, lights, first) = (self.points[pixel] as usize, self.shading.lights, self.values.len());
-            let normal = self.shading.points.normals[point];
-            let is_near = |k: usize| lights[k].direction.dot(normal) > LOWEST_COSINE;
-            self.is_bounced_missing |= self.evaluator.eval(part, point, is_near);
-            self.values.resize(first + lights.len(), None);
-            for (k, value) in self.evaluator.terms() {
-                self.values[first + k] = Some(value);
-            }
-            self.known[pixel] = first as u32;
+            self.known[pixel] = self.values_at(part, self.points[pixel]) as u32;
         }
         self.known[pixel] as usize
+    }
+
+    /// Evaluates the sources near or above the horizon of a point. Returns where their values begin.
+    fn values_at(&mut self, part: Part, point: u32) -> usize {
+        let (point, lights, first) = (point as usize, self.shading.lights, self.values.len());
+        let normal = self.shading.points.normals[point];
+        let is_near = |k: usize| lights[k].direction.dot(normal) > LOWEST_COSINE;
+        self.is_bounced_missing |= self.evaluator.eval(part, point, is_near);
+        self.values.resize(first + lights.len(), None);
+        for (k, value) in self.evaluator.terms() {
+            self.values[first + k] = Some(value);
+        }
+        first
     }
 }
 
