@@ -6,8 +6,8 @@
 use eframe::egui::{self, Button, FontId, Label, RichText, TextStyle, Ui, vec2};
 
 use super::editor::Editor;
-use super::panels::accuracy;
-use super::panels::place_of_remedy;
+use super::panels::effects::caption;
+use super::panels::{accuracy, place_of_remedy};
 use super::status_state::time;
 use super::theme;
 use super::worker::{AccuracyPoint, RenderedPreview};
@@ -226,7 +226,7 @@ fn count(number: usize, what: &str) -> String {
 }
 
 fn stages(preview: &RenderedPreview) -> Vec<String> {
-    preview.stages.iter().map(|(name, ms)| format!("{name} {}", time(*ms))).collect()
+    preview.stages.iter().map(|(name, ms)| format!("{} {}", caption(name).to_lowercase(), time(*ms))).collect()
 }
 
 /// PSNR and time of a point.

@@ -228,6 +228,7 @@ pub struct FitArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 pub struct TileArgs {
     #[command(flatten)]
     pub scene: SceneArgs,

@@ -191,7 +191,7 @@ pub fn check_outputs(
 
 /// Parses `WIDTHxHEIGHT`.
 pub fn parse_size(text: &str) -> std::result::Result<[usize; 2], String> {
-    let invalid = || format!("found `{text}`, expected two numbers like 384x384");
+    let invalid = || format!("found `{text}`, expected two whole numbers from 1 to 65536, like 384x192");
     let (a, b) = text.split_once(['x', 'X', '×']).ok_or_else(invalid)?;
     let number =
         |text: &str| text.trim().parse::<usize>().ok().filter(|n| (1..=65_536).contains(n)).ok_or_else(invalid);

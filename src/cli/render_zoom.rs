@@ -32,7 +32,11 @@ pub struct Zoom {
 
 /// Parses `FROM:TO:FRAMES`.
 pub fn parse(text: &str) -> std::result::Result<Zoom, String> {
-    let invalid = || format!("found `{text}`, expected FROM:TO:FRAMES, like 0.5:64:57");
+    let invalid = || {
+        format!(
+            "found `{text}`, expected FROM:TO:FRAMES like 0.5:64:57, with pixels per tile above 0 and 1 to {MOST_FRAMES} frames"
+        )
+    };
     let parts: Vec<&str> = text.split(':').collect();
     let [from, to, frames] = parts[..] else { return Err(invalid()) };
     let pixels = |text: &str| text.trim().parse::<f64>().ok().filter(|n| n.is_finite() && *n > 0.0).ok_or_else(invalid);

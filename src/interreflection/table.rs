@@ -284,8 +284,9 @@ mod tests {
             crate::math::directions::from_angles(theta, phi)
         };
         for _ in 0..50 {
-            let (lights, o) = ([(); 40].map(|()| direction()), direction());
-            let mut together = [DVec3::ZERO; 40];
+            // More than are evaluated at once.
+            let (lights, o) = ([(); LANES + 6].map(|()| direction()), direction());
+            let mut together = [DVec3::ZERO; LANES + 6];
             table.eval_lights(&lights, o, |k, g| together[k] = g);
             for (light, expected) in lights.into_iter().zip(together) {
                 table.eval_lights(&[light], o, |_, g| assert_eq!(g, expected, "{light} {o}"));

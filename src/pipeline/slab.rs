@@ -40,7 +40,7 @@ pub(super) fn refuse_slab(loaded: &LoadedScene) -> Result<()> {
     }
     let expected =
         "a scene without it; `biscale eval`, `transmit`, `render`, `export`, `fit`, `plan` and `profile` know slabs";
-    Err(InputError::new("slab", "a scene with a slab", expected).into())
+    Err(InputError::new("slab", "a scene with a slab", expected).in_file(&loaded.name).into())
 }
 
 impl Pipeline {

@@ -236,7 +236,10 @@ pub(super) fn parse_toml(source: &str) -> Result<Table> {
 
 fn syntax_error(source: &str, error: &toml::de::Error) -> Error {
     let place = error.span().map(|span| format!("line {}", line_at(source, span.start))).unwrap_or_default();
-    InputError::new(place, error.message().replace('\n', "; "), "TOML").into()
+    let message = error.message().replace('\n', "; ");
+    // Some messages say what was expected.
+    let (found, expected) = message.split_once(", expected ").unwrap_or((&message, "TOML"));
+    InputError::new(place, found, expected).into()
 }
 
 fn line_at(source: &str, offset: usize) -> usize {

@@ -150,8 +150,8 @@ fn set_in_list(entries: &mut Vec<Value>, keys: &[&str], value: &Value) -> std::r
             Some(format!("did you mean `{name}`?")),
         ));
     }
-    if !entries.iter().all(Value::is_table) {
-        return Err((format!("`{key}`"), "an index".to_owned(), None));
+    if !entries.iter().all(Value::is_table) || names.len() < count {
+        return Err((format!("`{key}`"), format!("an index from 0 to {}, or `*` for all", count - 1), None));
     }
     let mut entry = Value::Table(Table::from_iter([("name".to_owned(), Value::String(key.to_owned()))]));
     set(&mut entry)?;

@@ -95,6 +95,10 @@ fn wrong_overrides_are_named() {
         let message = set(TWO_COLOURS, &[text]).unwrap_err().to_string();
         assert!(message.contains("--set") && message.contains(part), "{text}: {message}");
     }
+    // The terms of a BRDF have no names.
+    let layered = "[tile]\ngeometry = { kind = \"flat\" }\n[[material]]\nname = \"default\"\nbrdf = [{ kind = \"ward\" }, { kind = \"lambertian\" }]\n";
+    let message = set(layered, &["material.default.brdf.roughness=0.4"]).unwrap_err().to_string();
+    assert!(message.contains("found `roughness`, expected an index from 0 to 1, or `*` for all"), "{message}");
 }
 
 #[test]

@@ -38,7 +38,7 @@ pub fn table_ui(
     let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
     export_dialog(ctx, "Export the BRDF as a table", path, |ui| {
         match ending.as_str() {
-            _ if crate::export::grid_is_free(path) => grid_ui(ui, choice),
+            _ if crate::export::grid_is_free(path) => grid_ui(ui, choice, &ending),
             "bsdf" => rgl_ui(ui, choice),
             "xml" => radiance_ui(ui, choice),
             _ => drop(ui.label("This format has a fixed grid of directions.")),
@@ -58,8 +58,8 @@ pub fn table_ui(
     })
 }
 
-/// Draws the resolution of a format whose grid is free.
-fn grid_ui(ui: &mut Ui, choice: &mut TableChoice) {
+/// Draws the resolution of a format whose grid is free, and the size of the file.
+fn grid_ui(ui: &mut Ui, choice: &mut TableChoice, ending: &str) {
     let TableChoice { theta, phi, .. } = choice;
     Grid::new("table").num_columns(2).show(ui, |ui| {
         let label = ui.label("Polar steps (normal to horizon)");
@@ -70,8 +70,14 @@ fn grid_ui(ui: &mut Ui, choice: &mut TableChoice) {
         ui.end_row();
     });
     let pairs = (*theta * *phi) as f64 * (*theta * *phi) as f64;
-    let (millions, megabytes) = (pairs / 1e6, pairs * 24.0 / 1e6);
-    ui.label(format!("{millions:.1} million direction pairs, about {megabytes:.0} MB as .npz"));
+    // Texts have about so many characters per pair.
+    let bytes_per_pair = match ending {
+        "csv" => 110.0,
+        "astm" => 75.0,
+        _ => 24.0,
+    };
+    let (millions, megabytes) = (pairs / 1e6, pairs * bytes_per_pair / 1e6);
+    ui.label(format!("{millions:.1} million direction pairs, about {megabytes:.0} MB"));
     ui.weak("Glossy materials need more steps.");
 }
 

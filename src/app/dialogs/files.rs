@@ -270,6 +270,14 @@ impl FileDialog {
         {
             path.set_extension(ending);
         }
+        let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
+        let (endings, has_formats) = (self.purpose.endings(), super::formats::of(&self.purpose).is_some());
+        // The next dialog examines the ending of a format.
+        if !has_formats && !ending.is_some_and(|ending| endings.contains(&ending.as_str())) {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            self.error = Some(format!("Found {name}, expected a name that ends in .{}.", endings.join(" or .")));
+            return None;
+        }
         if path.exists() && self.overwrite.as_ref() != Some(&path) {
             self.error = Some(format!("{} already exists.", path.display()));
             self.overwrite = Some(path);

@@ -53,6 +53,7 @@ impl Document {
         scene.validate()?;
         self.write_images(&scene, &folder)?;
         crate::base::replace_file(&path, scene.to_toml()?.as_bytes())?;
+        let is_changed = scene != *self.state.scene || folder != self.base_dir || stem != self.name;
         if scene != *self.state.scene {
             let after = Arc::new(scene);
             let before = std::mem::replace(&mut self.state.scene, after.clone());
@@ -63,7 +64,8 @@ impl Document {
         self.path = Some(path);
         self.saved = Some(self.history.state());
         self.history.close();
-        self.version += 1;
+        // The same scene keeps its image and its measurements.
+        self.version += u64::from(is_changed);
         Ok(())
     }
 

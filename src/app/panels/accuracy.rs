@@ -9,7 +9,7 @@ use crate::tuning::quality_scale;
 use eframe::egui::{Context, TextureHandle, TextureOptions};
 
 use super::accuracy_chart;
-use crate::app::worker::{AccuracyChart, AccuracyJob, AccuracyPoint, AccuracyResult, without_settings};
+use crate::app::worker::{AccuracyChart, AccuracyJob, AccuracyPoint, AccuracyResult, FINER_DB, without_settings};
 
 /// State of the panel between frames.
 #[derive(Default)]
@@ -55,7 +55,7 @@ impl AccuracyState {
         self.examine(version, loaded);
         let wanted = (version, self.comparing, self.measuring, is_final);
         let may_start = is_final || self.open && self.levels.is_empty();
-        if !self.is_needed() || !may_start || self.requested == Some(wanted) {
+        if loaded.scene.slab.is_some() || !self.is_needed() || !may_start || self.requested == Some(wanted) {
             return None;
         }
         self.requested = Some(wanted);
@@ -99,7 +99,10 @@ impl AccuracyState {
         let Some(now) = self.now(version).filter(|_| self.is_fresh(version)) else { return [None; 2] };
         let points: Vec<&AccuracyPoint> = self.levels.iter().collect();
         let front = accuracy_chart::front(&points);
-        let faster = front.iter().rev().find(|point| point.ms < NEARER * now.ms);
+        // These settings may be a level themselves, which took another time.
+        let own = front.iter().filter(|point| point.is_same(&now)).map(|point| point.ms);
+        let ms = own.fold(now.ms, f64::min);
+        let faster = front.iter().rev().find(|point| point.ms < NEARER * ms && !point.is_same(&now));
         let finer = front.iter().find(|point| point.compared.psnr_db > now.compared.psnr_db + FINER_DB);
         [faster, finer].map(|point| point.map(|point| **point))
     }
@@ -207,9 +210,8 @@ impl AccuracyState {
     }
 }
 
-/// Factor on the time, and difference of PSNR [dB], from which settings count as faster and finer.
+/// Factor on the time from which settings count as faster.
 const NEARER: f64 = 0.9;
-const FINER_DB: f64 = 0.5;
 /// Uncertainty of an error that a result states itself [dB].
 pub const STATED_DB: f64 = 3.0;
 

@@ -104,11 +104,15 @@ pub fn ui(
     ui.separator();
     if *inputs.tab == Tab::Cost {
         let (state, at) = (inputs.accuracy, (inputs.version, inputs.file));
-        section(ui, reveal, "Accuracy", true, |ui| {
-            accuracy_ui::ui(ui, scene, (state, inputs.targets), inputs.effects, at)
+        let is_slab = scene.slab.is_some();
+        section(ui, reveal, "Accuracy", true, |ui| match is_slab {
+            true => drop(ui.label(SLAB_ACCURACY)),
+            false => accuracy_ui::ui(ui, scene, (state, inputs.targets), inputs.effects, at),
         });
         section(ui, reveal, "Time", true, |ui| stage_bars::ui(ui, inputs.stages));
-        section(ui, reveal, "Effects", true, |ui| effects::ui(ui, scene, inputs.effects, state, inputs.version));
+        if !is_slab {
+            section(ui, reveal, "Effects", true, |ui| effects::ui(ui, scene, inputs.effects, state, inputs.version));
+        }
         section(ui, reveal, "Quality", false, |ui| large_scale::quality_ui(ui, &mut scene.quality, &mut context));
         return PanelRequests { browse: context.browse, error: context.error, ..PanelRequests::default() };
     }
@@ -127,6 +131,9 @@ pub fn ui(
     section(ui, reveal, "Camera", false, |ui| large_scale::camera_ui(ui, scene, &mut context));
     PanelRequests { browse: context.browse, material, driver_image, slab_file, error: context.error, changing }
 }
+
+/// What the tab says of a slab in place of a curve.
+const SLAB_ACCURACY: &str = "Accuracy against time is measured for opaque tiles. The accuracy of a slab follows from its method, in the section Slab of the tab Scene.";
 
 fn section(ui: &mut Ui, reveal: &mut Option<&'static str>, title: &str, open: bool, body: impl FnOnce(&mut Ui)) {
     foldable(ui, reveal, title, open, None, body);

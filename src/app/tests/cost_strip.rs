@@ -121,6 +121,18 @@ fn faster_and_finer_settings_are_taken_by_a_click_and_undone_in_one_step() {
 }
 
 #[test]
+fn settings_that_the_scene_has_are_not_offered_as_faster_ones() {
+    let mut harness = of_size(quick(), 1400.0, 800.0);
+    let version = editor(&mut harness).document.version();
+    // The level took less time than the same settings of the scene.
+    let levels = vec![point(256, 118.0, 31.0), point(1024, 400.0, 47.0)];
+    editor(&mut harness).accuracy.record(version, levels, point(256, 277.0, 31.2));
+    harness.run_steps(2);
+    assert!(harness.query_by_label("Faster: none").is_some());
+    assert!(harness.query_by_label("Finer: 47 dB · 400 ms").is_some());
+}
+
+#[test]
 fn settings_that_are_finer_and_faster_are_offered_only_if_they_exist() {
     let mut harness = of_size(quick(), 1400.0, 1500.0);
     harness.key_press(eframe::egui::Key::F6);

@@ -99,6 +99,9 @@ fn a_saved_and_reopened_document_is_equal_with_its_painted_images() {
     document.save_as(&path).unwrap();
     assert!(!document.is_dirty() && !document.changed_on_disk());
     assert!(folder.path().join("relief_heights.exr").is_file());
+    let version = document.version();
+    document.save_as(&path).unwrap();
+    assert_eq!(document.version(), version, "the same scene keeps its image and its measurements");
     let opened = Document::open(path.to_str().unwrap()).unwrap();
     assert_eq!(opened.scene(), document.scene());
     let mesh = |document: &Document| {

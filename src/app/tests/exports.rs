@@ -5,7 +5,7 @@ use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable;
 
 use super::{editor, harness, quick, settle};
-use crate::app::dialogs::{Dialog, Purpose};
+use crate::app::dialogs::{Dialog, FileDialog, Purpose};
 use crate::app::document::Document;
 use crate::app::worker::{ExportKind, TableChoice};
 
@@ -104,6 +104,25 @@ fn every_format_of_the_tile_and_of_fits_is_exported_from_its_dialog() {
         let texts = editor(&mut harness).messages.texts().join("; ");
         assert!(texts.contains("Wrote") && std::fs::metadata(&path).unwrap().len() > 100, "{ending}: {texts}");
     }
+}
+
+#[test]
+fn a_scene_is_saved_under_no_other_ending_than_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut harness = harness(quick());
+    editor(&mut harness).dialog = Some(Dialog::Files(FileDialog::new(Purpose::SaveScene, folder.path(), "")));
+    harness.run_steps(3);
+    for (name, is_saved) in [("relief.png", false), ("relief", true)] {
+        if let Some(Dialog::Files(files)) = &mut editor(&mut harness).dialog {
+            files.typed = name.to_owned();
+        }
+        harness.get_by_label("Save").click();
+        harness.run_steps(3);
+        let complaint = "Found relief.png, expected a name that ends in .toml.";
+        assert_eq!(harness.query_by_label(complaint).is_none(), is_saved);
+        assert_eq!(folder.path().join("relief.toml").exists(), is_saved);
+    }
+    assert!(!folder.path().join("relief.png").exists());
 }
 
 #[test]

@@ -116,6 +116,16 @@ fn index_roughness_and_alpha_have_controls_in_all_their_forms() {
 }
 
 #[test]
+fn the_cost_tab_of_a_slab_measures_nothing_and_says_why() {
+    let mut harness = tall(sheet());
+    harness.key_press(eframe::egui::Key::F6);
+    harness.run_steps(5);
+    assert!(harness.query_by_label_contains("measured for opaque tiles").is_some());
+    assert!(harness.query_by_label("Compare with reference").is_none());
+    assert!(editor(&mut harness).accuracy.activity.is_none());
+}
+
+#[test]
 fn a_slab_is_added_and_removed_and_its_background_is_dragged_away_in_one_undo_step() {
     let mut harness = tall(quick());
     harness.get_by_label("Slab").click();

@@ -76,10 +76,13 @@ impl LobeState {
         let (theta, phi) = to_angles(self.light);
         ui.horizontal(|ui| {
             ui.strong("Reflection");
-            ui.weak(format!("light {:.0}° / {:.0}°", theta.to_degrees(), phi.to_degrees()))
-                .on_hover_text("Polar angle and azimuth");
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 ui.toggle_value(&mut self.log, "Log").on_hover_text("Logarithmic scale over three decades");
+                ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
+                    let text = format!("light {:.0}° / {:.0}°", theta.to_degrees(), phi.to_degrees());
+                    let label = egui::Label::new(egui::RichText::new(text).weak()).truncate();
+                    ui.add(label).on_hover_text("Polar angle and azimuth");
+                });
             });
         });
         let width = ui.available_width();

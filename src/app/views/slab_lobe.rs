@@ -15,9 +15,12 @@ use crate::app::worker::{LobeCurve, SlabLobe, SlabLobeJob, SlabLobeResult};
 const BAR: f32 = 16.0;
 /// Height of everything around the two plots [points].
 pub const AROUND: f32 = 150.0;
-/// Colours of the curves and of the parts of the light.
+/// Colours of the curves and their names, on dark and on light ground.
 const CURVES: [Color32; 3] =
     [Color32::from_rgb(255, 170, 60), Color32::from_rgb(90, 180, 255), Color32::from_rgb(150, 220, 120)];
+const CURVES_ON_LIGHT: [Color32; 3] =
+    [Color32::from_rgb(164, 84, 0), Color32::from_rgb(16, 92, 180), Color32::from_rgb(40, 108, 20)];
+/// Colours of the parts of the light.
 const PARTS: [Color32; 5] = [
     Color32::from_rgb(90, 180, 255),
     Color32::from_rgb(150, 110, 220),
@@ -140,7 +143,8 @@ impl SlabLobeState {
         // The noise of the first photons must not shrink the models.
         let of_models = shown.curves.iter().filter(|curve| curve.errors.is_none()).flat_map(|curve| &curve.values);
         let peak = 1.05 * of_models.fold(f32::MIN_POSITIVE, |peak, value| peak.max(*value));
-        for (k, (curve, color)) in shown.curves.iter().zip(CURVES).enumerate() {
+        let colors = if ui.visuals().dark_mode { CURVES } else { CURVES_ON_LIGHT };
+        for (k, (curve, color)) in shown.curves.iter().zip(colors).enumerate() {
             draw_curve(&painter, curve, origin, radius / peak, color);
             let at = area.left_top() + vec2(2.0, 13.0 * k as f32);
             painter.text(at, Align2::LEFT_TOP, curve.name, FontId::proportional(10.5), color);

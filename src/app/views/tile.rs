@@ -252,17 +252,15 @@ impl TileState {
             ui.spacing_mut().button_padding.x = 5.0;
             ui.strong("Tile");
             ui.add_space(4.0);
-            if self.picked.is_some() {
-                let tip = "Contribution of each place to the reflection at the picked point of the object";
-                if ui.selectable_label(self.show == TileMode::Contribution, "Picked").on_hover_text(tip).clicked() {
-                    self.show = TileMode::Contribution;
-                }
-            }
             for (mode, name, tip) in [
                 (TileMode::Clay, "Clay", "Diffuse grey under one light, which shows the shape best"),
                 (TileMode::Materials, "Real", "The materials under the scene's light"),
                 (TileMode::Normals, "Normals", "Normals as colours"),
-                (TileMode::Visibility, "Visible", "Green: visible from the light of the lobe view. Red: occluded"),
+                (
+                    TileMode::Visibility,
+                    "Visible",
+                    "Green: visible from the light of the view Reflection. Red: occluded",
+                ),
             ] {
                 if ui.selectable_label(self.show == mode, name).on_hover_text(tip).clicked() {
                     self.show = mode;
@@ -277,6 +275,13 @@ impl TileState {
             }
             if ui.selectable_label(self.painting, "Paint").on_hover_text("Paint on the tile (P)").clicked() {
                 painting = Some(!self.painting);
+            }
+            // The last one, because it appears only when a point is picked.
+            if self.picked.is_some() {
+                let tip = "Contribution of each place to the reflection at the picked point of the object";
+                if ui.selectable_label(self.show == TileMode::Contribution, "Picked").on_hover_text(tip).clicked() {
+                    self.show = TileMode::Contribution;
+                }
             }
         });
         painting

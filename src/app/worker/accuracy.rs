@@ -49,6 +49,18 @@ pub struct AccuracyPoint {
     pub compared: ReferenceErrors,
 }
 
+/// Difference of PSNR [dB] from which settings count as finer.
+pub const FINER_DB: f64 = 0.5;
+
+impl AccuracyPoint {
+    /// Returns true if two points are those of the same settings, measured at two times.
+    pub fn is_same(&self, other: &Self) -> bool {
+        let [own, others] = [self, other].map(|point| point.compared.psnr_db);
+        // The same value also stands for two points without any error, whose PSNR is infinite.
+        self.facets == other.facets && (own == others || (own - others).abs() <= FINER_DB)
+    }
+}
+
 /// A report of the worker that measures accuracy.
 #[derive(Debug, Clone)]
 pub enum AccuracyResult {

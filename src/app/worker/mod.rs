@@ -38,7 +38,7 @@ use crate::pipeline::Pipeline;
 use super::document::Snapshot;
 use runner::Threads;
 
-pub use accuracy::{AccuracyChart, AccuracyJob, AccuracyPoint, AccuracyResult, without_settings};
+pub use accuracy::{AccuracyChart, AccuracyJob, AccuracyPoint, AccuracyResult, FINER_DB, without_settings};
 pub use capture::{CaptureJob, CaptureResult, ShownCapture};
 pub use color_map::{ColorMapJob, ColorMapResult, DriverValues, REACH as HISTOGRAM_REACH};
 pub use export::{ExportJob, ExportKind, ExportResult, TableChoice};

@@ -262,16 +262,44 @@ fn bounced_light_between_points_is_that_at_the_points() {
     }
 }
 
-/// Counts the points at which a material is evaluated.
+/// Counts the points at which a material, and its light between facets, are evaluated.
 struct Counted<'a> {
     material: &'a dyn Reflectance,
     points: std::sync::atomic::AtomicUsize,
+    bounced: std::sync::atomic::AtomicUsize,
+}
+
+impl<'a> Counted<'a> {
+    fn new(material: &'a dyn Reflectance) -> Self {
+        Self { material, points: 0.into(), bounced: 0.into() }
+    }
 }
 
 impl Reflectance for Counted<'_> {
     fn eval_lights(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) {
         self.points.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
         self.material.eval_lights(lights, o, out);
+    }
+
+    fn eval_direct(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) -> bool {
+        self.points.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        self.material.eval_direct(lights, o, out)
+    }
+
+    fn eval_bounced(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) {
+        self.bounced.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        self.material.eval_bounced(lights, o, out);
+    }
+}
+
+#[test]
+fn light_between_facets_is_evaluated_at_a_part_of_the_points_of_direct_light() {
+    for kind in ["sphere", "cup", "plate", "teapot"] {
+        let counted = Counted::new(&Bounced { is_apart: true });
+        let points = image(&object(kind), &many_lights(), &counted, &scene::Camera::default()).points as f64;
+        let [direct, bounced] = [counted.points, counted.bounced].map(|count| count.into_inner() as f64 / points);
+        eprintln!("{kind}: direct light at {direct:.3} of the points, light between facets at {bounced:.3}");
+        assert!(bounced < 0.8 * direct, "{kind}: {bounced} of {direct}");
     }
 }
 
@@ -282,7 +310,7 @@ fn images_evaluate_a_material_at_a_part_of_the_points_and_stay_within_their_tole
         for lobe in [brushed(0.02, 0.02), brushed(0.05, 0.05), brushed(0.2, 0.2), brushed(0.1, 0.35)] {
             let (mesh, lights, camera) = (object(kind), many_lights(), scene::Camera::default());
             let exact = image_within(0.0, &mesh, &lights, &lobe, &camera);
-            let counted = Counted { material: &lobe, points: 0.into() };
+            let counted = Counted::new(&lobe);
             let interpolated = image(&mesh, &lights, &counted, &camera);
             let part = counted.points.into_inner() as f64 / interpolated.points as f64;
             let (rel_l2, worst) = differences(&interpolated.image, &exact.image);
@@ -291,7 +319,7 @@ fn images_evaluate_a_material_at_a_part_of_the_points_and_stay_within_their_tole
             let most = if lobe.alpha[0] < 0.05 { 0.2 } else { 0.05 };
             assert!(rel_l2 < f64::from(TOLERANCE) && worst < most, "{kind} {:?}: {rel_l2} {worst}", lobe.alpha);
         }
-        let counted = Counted { material: &Lambertian, points: 0.into() };
+        let counted = Counted::new(&Lambertian);
         let points = image(&object(kind), &many_lights(), &counted, &scene::Camera::default()).points;
         let part = counted.points.into_inner() as f64 / points as f64;
         eprintln!("{kind}, Lambertian: {part:.3} of the points");
@@ -312,7 +340,7 @@ impl Reflectance for Even {
 fn interpolation_keeps_the_edges_of_shadows_and_the_horizons_of_lights() {
     for kind in ["sphere", "cup", "skirt"] {
         let (mesh, lights, camera) = (object(kind), many_lights(), scene::Camera::default());
-        let counted = Counted { material: &Even, points: 0.into() };
+        let counted = Counted::new(&Even);
         let interpolated = image(&mesh, &lights, &counted, &camera);
         let exact = image_within(0.0, &mesh, &lights, &Even, &camera);
         let (_, worst) = differences(&interpolated.image, &exact.image);
