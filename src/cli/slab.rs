@@ -16,5 +16,6 @@ pub fn refuse(loaded: &LoadedScene, command: &str) -> Result<()> {
     let expected = format!(
         "a scene without it: `biscale {command}` knows no slabs; `eval`, `transmit`, `render`, `export`, `fit`, `plan` and `profile` do"
     );
-    Err(crate::Error::from(InputError::new("slab", "a scene with a slab", expected)).into())
+    let error = InputError::new("slab", "a scene with a slab", expected).in_file(&loaded.name);
+    Err(crate::Error::from(error).into())
 }

@@ -8,6 +8,7 @@ use eframe::egui::{self, Label, Slider, Ui, vec2};
 use super::accuracy::{AccuracyState, describe_point, take, take_level};
 use super::{TargetState, accuracy_chart, fields, targets};
 use crate::app::views::spinner::spinner;
+use crate::app::worker::AccuracyPoint;
 
 /// Rows of text that stay free for errors and time of the scene's settings.
 const CURRENT_ROWS: f32 = 2.0;
@@ -41,7 +42,10 @@ pub fn ui(
     fields::reserved(ui, CURRENT_ROWS, |ui| ui.label(text));
     let is_stale = !state.levels.is_empty() && !state.is_fresh(version);
     fields::reserved(ui, 1.0, |ui| advice_ui(ui, scene, state, effects, (version, is_stale)));
-    if let Some(point) = accuracy_chart::ui(ui, &state.levels, current.as_ref(), is_stale) {
+    // A level with the settings of the scene would be a second point for them, which another time moved.
+    let is_other = |level: &&AccuracyPoint| current.is_none_or(|current| !current.is_same(level));
+    let levels: Vec<AccuracyPoint> = state.levels.iter().filter(is_other).copied().collect();
+    if let Some(point) = accuracy_chart::ui(ui, &levels, current.as_ref(), is_stale) {
         take(scene, point.facets, effects);
     }
     ui.horizontal(|ui| {
