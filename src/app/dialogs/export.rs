@@ -70,7 +70,7 @@ fn grid_ui(ui: &mut Ui, choice: &mut TableChoice, ending: &str) {
         ui.end_row();
     });
     let pairs = (*theta * *phi) as f64 * (*theta * *phi) as f64;
-    // Texts have about so many characters per pair.
+    // Sizes of exports of 9 x 24 directions, divided by their pairs.
     let bytes_per_pair = match ending {
         "csv" => 110.0,
         "astm" => 75.0,

@@ -132,8 +132,9 @@ pub fn ui(
     PanelRequests { browse: context.browse, material, driver_image, slab_file, error: context.error, changing }
 }
 
-/// What the tab says of a slab in place of a curve.
-const SLAB_ACCURACY: &str = "Accuracy against time is measured for opaque tiles. The accuracy of a slab follows from its method, in the section Slab of the tab Scene.";
+/// Text in place of the accuracy of a slab.
+const SLAB_ACCURACY: &str = "Accuracy against time is measured for opaque tiles. The accuracy of a slab follows from its \
+    method, in the section Slab of the tab Scene.";
 
 fn section(ui: &mut Ui, reveal: &mut Option<&'static str>, title: &str, open: bool, body: impl FnOnce(&mut Ui)) {
     foldable(ui, reveal, title, open, None, body);

@@ -1,4 +1,4 @@
-//! What follows a final image: its warnings, the error of its BRDF, and the same image after an edit of exposure or tone map.
+//! Work after a final image: its warnings, the error of its BRDF, and the same image after an edit of exposure or tone map.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
