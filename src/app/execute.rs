@@ -65,8 +65,11 @@ impl Editor {
                 self.browse(Purpose::ExportImage, &name);
             }
             Action::Sweep if self.document.scene().slab.is_some() => {
-                let text =
-                    "biscale.batch computes what a tile reflects, and not what a slab transmits: no sweep of a slab.";
+                let text = "A slab cannot be swept, because biscale.batch computes only what a tile reflects.";
+                self.messages.put(Level::Note, "sweep", text);
+            }
+            Action::Sweep if self.document.base_name().is_none() => {
+                let text = "Save the scene first: the specification of a sweep refers to the file of the scene.";
                 self.messages.put(Level::Note, "sweep", text);
             }
             Action::Sweep => {
@@ -191,6 +194,7 @@ impl Editor {
         match self.document.save_as(path) {
             Ok(()) => {
                 self.messages.clear("save");
+                self.settings.files = path.parent().map(Path::to_owned);
                 if let Some(recovery) = &self.recovery {
                     recovery.clear();
                 }

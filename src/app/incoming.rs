@@ -57,7 +57,10 @@ impl Editor {
 
     /// Uses the file that the user chose.
     pub(super) fn use_file(&mut self, ctx: &Context, purpose: Purpose, path: PathBuf) {
-        self.settings.files = path.parent().map(Path::to_owned);
+        // The folder of a scene counts once the scene is saved.
+        if purpose != Purpose::SaveScene {
+            self.settings.files = path.parent().map(Path::to_owned);
+        }
         let mut scene = (**self.document.scene()).clone();
         let relative = self.relative_path(&path);
         match purpose {
@@ -115,7 +118,8 @@ impl Editor {
                 return;
             }
             Purpose::ExportSweep => {
-                let sweep = Sweep::new(&scene, self.document.base_name(), self.material_ms());
+                let Some(base) = self.document.base_name() else { return };
+                let sweep = Sweep::new(&scene, base, self.material_ms());
                 self.dialog = Some(Dialog::Sweep { path, sweep });
                 return;
             }

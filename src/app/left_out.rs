@@ -36,7 +36,9 @@ impl Editor {
             for (name, left_out) in &missing {
                 ui.label(line(name, left_out));
                 let tolerance = 100.0 * left_out.tolerance;
-                ui.label(format!("The quality tolerates {tolerance:.1} %. The dB are those of what is simulated."));
+                ui.label(format!(
+                    "The quality tolerates {tolerance:.1} %. The PSNR counts only the light that is simulated."
+                ));
                 if ui.button("Add").on_hover_text("Simulate it; one undo step").clicked() {
                     added = Some(*name);
                     ui.close();

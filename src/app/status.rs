@@ -11,6 +11,7 @@ use super::panels::{accuracy, place_of_remedy};
 use super::status_state::time;
 use super::theme;
 use super::worker::{AccuracyPoint, RenderedPreview};
+use crate::base::capitalized;
 use crate::plan::Effect;
 
 /// Width of a separator with its spacing, of the padding of a button, and of the dot before the state [points].
@@ -167,7 +168,8 @@ impl Editor {
     /// Lists the warnings, each with a button that shows where its remedy is.
     fn warnings_ui(&mut self, ui: &mut Ui) {
         for warning in &self.object.warnings {
-            ui.label(warning);
+            // A sentence of its own here, and on the command line the rest of a line.
+            ui.label(capitalized(&warning.replace('`', "")));
             let (tab, section) = place_of_remedy(warning);
             if ui.button("Show").on_hover_text(format!("Open {section} of the parameters")).clicked() {
                 (self.tab, self.reveal) = (tab, Some(section));

@@ -67,8 +67,8 @@ impl Editor {
     }
 
     fn cost_tip(&self) -> String {
-        let measured = "PSNR of the effective BRDF against the reference, of what is simulated, and the time from an edit of \
-                        the geometry to the effective BRDF.";
+        let measured = "PSNR of the effective BRDF against the reference, which counts only the light that is simulated, and \
+                        the time from an edit of the geometry to the effective BRDF.";
         match self.object.stated_error() {
             Some(error) => format!("{measured}\n{}", error_parts(&error)),
             None => measured.to_owned(),

@@ -1,6 +1,8 @@
 //! The catalogue of scene keys: name, unit, range and meaning of each. Validation, the editor's sliders and the
 //! documentation read the same entries.
 
+use crate::base::capitalized;
+
 /// One key of a scene file.
 #[derive(Debug, Clone)]
 pub struct Field {
@@ -32,9 +34,7 @@ impl Field {
 
     /// The key as a caption: `side_angle_deg` becomes `Side angle`.
     pub fn label(&self) -> String {
-        let words = self.key.trim_end_matches("_deg").replace('_', " ");
-        let mut letters = words.chars();
-        letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
+        capitalized(&self.key.trim_end_matches("_deg").replace('_', " "))
     }
 }
 

@@ -278,6 +278,10 @@ impl FileDialog {
             self.error = Some(format!("Found {name}, expected a name that ends in .{}.", endings.join(" or .")));
             return None;
         }
+        if let Some(folder) = path.parent().filter(|folder| !folder.is_dir()) {
+            self.error = Some(format!("{}: the folder does not exist.", folder.display()));
+            return None;
+        }
         if path.exists() && self.overwrite.as_ref() != Some(&path) {
             self.error = Some(format!("{} already exists.", path.display()));
             self.overwrite = Some(path);

@@ -33,7 +33,7 @@ const TASKS: [(&str, &str); 16] = [
         "See through frosted glass",
         "Search the gallery for \"slab\" and click a scene, or unfold Slab and tick its box. Top and Bottom are the two \
          faces: smooth, rough, or a tile. Drag Distance, or drag in the view with Ctrl, to move the background away, which blurs it. Below the tile, drag \
-         the light on the disc: the curves show the transmitted light by each method, and photons as the truth.",
+         the light on the disc: the curves show the transmitted light by each method, and photons as the reference.",
     ),
     (
         "See how far off the result is",
@@ -61,9 +61,9 @@ const TASKS: [(&str, &str); 16] = [
          each dot there, and below it stand a slice of the data with its model, and the slopes of the faces.",
     ),
     (
-        "Compare with the truth",
+        "Compare with the reference",
         "For a slab or a colour map, press M. The view shows three methods beside each other; drag the lines between them. \
-         The truth is added up while you look, and states its standard error.",
+         The reference is added up while you look, and states its standard error.",
     ),
     (
         "Use a measured BRDF",

@@ -15,8 +15,8 @@ const MAX_CHOICES: f64 = 1000.0;
 /// A data set of materials that vary in some keys of a scene.
 #[derive(Debug, Clone)]
 pub struct Sweep {
-    /// File or shipped name of the scene; `None` if no file holds it as it is.
-    base: Option<String>,
+    /// File or shipped name of the scene.
+    base: String,
     keys: Vec<SweptKey>,
     count: u64,
     /// Pairs of directions per material.
@@ -38,7 +38,7 @@ struct SweptKey {
 impl Sweep {
     /// A sweep over the numbers of a scene, none of which vary yet. `ms` is the time of one material without its pairs of
     /// directions, and of a pair.
-    pub fn new(scene: &Scene, base: Option<String>, ms: [f64; 2]) -> Self {
+    pub fn new(scene: &Scene, base: String, ms: [f64; 2]) -> Self {
         let keys = keys_of(scene).unwrap_or_default().into_iter();
         let keys = keys.filter(describes_material).filter_map(SweptKey::new).collect();
         Self { base, keys, count: 1000, directions: 4096, preset: scene.quality.preset.clone(), ms }
@@ -55,13 +55,13 @@ impl Sweep {
     /// Returns true if the specification can be written.
     fn is_complete(&self) -> bool {
         let varied: Vec<&SweptKey> = self.keys.iter().filter(|key| key.is_on).collect();
-        self.base.is_some() && !varied.is_empty() && varied.iter().all(|key| key.range[0] < key.range[1])
+        !varied.is_empty() && varied.iter().all(|key| key.range[0] < key.range[1])
     }
 
     /// The specification as a file of `biscale.batch`.
     pub fn text(&self) -> String {
         let quoted = |text: &str| toml::Value::String(text.to_owned()).to_string();
-        let base = quoted(self.base.as_deref().unwrap_or_default());
+        let base = quoted(&self.base);
         let mut text = format!("base = {base}\ncount = {}\nseed = 1\n\n[sample]\n", self.count);
         for SweptKey { entry, range: [low, high], is_log, .. } in self.keys.iter().filter(|key| key.is_on) {
             let drawn = match (entry.kind, is_log) {
@@ -101,15 +101,12 @@ impl Sweep {
             ui.set_width(620.0);
             ui.heading("Sweep: a data set of materials");
             ui.label(
-                "Tick what varies. biscale.batch, a module of the Python package, draws each value from its range.",
+                "Tick the keys that vary. biscale.batch, a module of the Python package, draws each value from its range.",
             );
             ui.separator();
             ScrollArea::vertical().max_height(300.0).auto_shrink([false, true]).show(ui, |ui| self.keys_ui(ui));
             ui.separator();
             self.size_ui(ui);
-            if self.base.is_none() {
-                ui.colored_label(ui.visuals().warn_fg_color, "Save the scene first: the specification names its file.");
-            }
             ui.weak(path.display().to_string());
             footer(ui, self.is_complete(), &mut decision);
         });
@@ -184,7 +181,7 @@ mod tests {
 
     fn sweep() -> Sweep {
         let loaded = crate::scene::open("fig4b_bicolor_cup", &[]).unwrap();
-        Sweep::new(&loaded.scene, Some("fig4b_bicolor_cup".to_owned()), [10.0, 0.01])
+        Sweep::new(&loaded.scene, "fig4b_bicolor_cup".to_owned(), [10.0, 0.01])
     }
 
     #[test]
@@ -217,7 +214,5 @@ mod tests {
         assert!(counts.iter().all(toml::Value::is_integer) && counts.len() > 1, "{counts:?}");
         let (hours, bytes) = sweep.hours_and_bytes();
         assert!((hours - 1000.0 * (10.0 + 40.96) / 3.6e6).abs() < 1e-12 && bytes == 1000.0 * 4096.0 * 6.0);
-        sweep.base = None;
-        assert!(!sweep.is_complete(), "no file holds the scene");
     }
 }

@@ -63,13 +63,12 @@ impl Document {
         Ok(Self::new(loaded, path.is_file().then(|| std::path::absolute(path).unwrap_or_else(|_| path.to_owned()))))
     }
 
-    /// The file or the shipped name that opens the scene exactly as it is; `None` if neither holds it.
+    /// The file or the shipped name that holds the scene; `None` if neither does. A shipped scene may have another view.
     pub fn base_name(&self) -> Option<String> {
-        let is_shipped = || scene::shipped::names().any(|name| name == self.name);
         match &self.path {
-            _ if self.is_dirty() || *self.painted() != Painted::default() => None,
-            Some(path) => path.to_str().map(str::to_owned),
-            None => is_shipped().then(|| self.name.clone()),
+            Some(path) if !self.is_dirty() => path.to_str().map(str::to_owned),
+            None if !self.has_work() => scene::shipped::names().find(|name| *name == self.name).map(str::to_owned),
+            _ => None,
         }
     }
 

@@ -1,5 +1,6 @@
 //! Names of history entries: the first setting in which two scenes differ.
 
+use crate::base::capitalized;
 use crate::scene::Scene;
 use toml::{Table, Value};
 
@@ -69,9 +70,7 @@ fn caption_of(path: &[String]) -> String {
             _ => "BRDF model".to_owned(),
         };
     }
-    if let Some(first) = caption.get_mut(0..1) {
-        first.make_ascii_uppercase();
-    }
+    let caption = capitalized(&caption);
     match path.iter().find(|step| step.starts_with('"')) {
         Some(name) => format!("{caption} of {name}"),
         None => caption,

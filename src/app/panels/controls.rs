@@ -192,13 +192,21 @@ fn color_value(rgb: [f32; 3]) -> Value {
     Value::Array(rgb.map(|channel| Value::Float(f64::from(channel))).to_vec())
 }
 
+/// Draws a colour, and its channels as numbers where the panel is wide enough.
 fn color_ui(ui: &mut Ui, value: &mut Value, max: f64, wrong: &Cell<bool>) {
+    /// Smallest widths of a number with two and with three decimals, and largest width [points].
+    const WIDTHS: [f32; 3] = [36.0, 44.0, 48.0];
     color_button(ui, value);
     let Some(mut rgb) = rgb_of(value) else { return };
     let before = rgb;
-    let width = ((ui.available_width() - 14.0) / 3.0).clamp(30.0, 48.0);
+    let width = ((ui.available_width() - 2.0 * ui.spacing().item_spacing.x) / 3.0).min(WIDTHS[2]);
+    if width < WIDTHS[0] {
+        return;
+    }
+    let decimals = if width < WIDTHS[1] { 2 } else { 3 };
+    ui.spacing_mut().interact_size.x = width;
     for channel in &mut rgb {
-        let drag = DragValue::new(channel).range(0.0..=max as f32).speed(0.005).max_decimals(3);
+        let drag = DragValue::new(channel).range(0.0..=max as f32).speed(0.005).max_decimals(decimals);
         ui.add_sized([width, ui.spacing().interact_size.y], finite(drag, wrong));
     }
     if rgb != before && rgb.iter().all(|channel| channel.is_finite()) {

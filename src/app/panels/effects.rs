@@ -1,6 +1,7 @@
 //! The effects of the plan: state, reason, cost, and a switch that forces each one.
 
 use crate::app::theme;
+use crate::base::capitalized;
 use crate::plan::{Effect, EffectKind, effect_names, switch_mut};
 use crate::report::EffectCost;
 use crate::scene::{Scene, Switch};
@@ -157,11 +158,7 @@ fn effect_state(effect: &Effect) -> String {
 
 /// Returns the displayed name of an effect.
 pub fn caption(name: &str) -> String {
-    let mut letters = name.replace('_', " ").replace("color", "colour").chars().collect::<Vec<_>>();
-    if let Some(first) = letters.first_mut() {
-        *first = first.to_ascii_uppercase();
-    }
-    letters.into_iter().collect()
+    capitalized(&name.replace('_', " ").replace("color", "colour"))
 }
 
 fn switch_label(switch: Switch) -> &'static str {

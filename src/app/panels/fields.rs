@@ -1,5 +1,6 @@
 //! Rows of captions and controls for fields of the scene catalogue, with range, unit and tooltip.
 
+use crate::base::capitalized;
 use crate::scene::{Field, FieldShape};
 use eframe::egui::{self, Align, Layout, RichText, Ui};
 use toml::Table;
@@ -186,7 +187,5 @@ pub fn display_name(name: &str) -> String {
         "wu2011" => return "As the 2011 paper".to_owned(),
         _ => {}
     }
-    let words = name.replace('_', " ");
-    let mut letters = words.chars();
-    letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
+    capitalized(&name.replace('_', " "))
 }

@@ -139,6 +139,7 @@ fn a_path_that_cannot_be_written_is_reported_and_the_document_stays_unsaved() {
     editor.save(std::path::Path::new("/nonexistent/folder/a.toml"));
     let texts = editor.messages.texts().join("; ");
     assert!(texts.contains("Not saved") && texts.contains("nonexistent") && texts.contains("still here"), "{texts}");
+    assert_eq!(editor.settings.files, None, "the next dialog does not start there");
     assert!(editor.document.is_dirty());
 }
 

@@ -107,20 +107,25 @@ fn every_format_of_the_tile_and_of_fits_is_exported_from_its_dialog() {
 }
 
 #[test]
-fn a_scene_is_saved_under_no_other_ending_than_its_own() {
+fn a_scene_is_saved_under_its_own_ending_and_in_a_folder_that_exists() {
     let folder = tempfile::tempdir().unwrap();
     let mut harness = harness(quick());
     editor(&mut harness).dialog = Some(Dialog::Files(FileDialog::new(Purpose::SaveScene, folder.path(), "")));
     harness.run_steps(3);
-    for (name, is_saved) in [("relief.png", false), ("relief", true)] {
+    let missing = folder.path().join("missing");
+    let complaints = [
+        ("relief.png", Some("Found relief.png, expected a name that ends in .toml.".to_owned())),
+        ("missing/relief.toml", Some(format!("{}: the folder does not exist.", missing.display()))),
+        ("relief", None),
+    ];
+    for (name, complaint) in complaints {
         if let Some(Dialog::Files(files)) = &mut editor(&mut harness).dialog {
             files.typed = name.to_owned();
         }
         harness.get_by_label("Save").click();
         harness.run_steps(3);
-        let complaint = "Found relief.png, expected a name that ends in .toml.";
-        assert_eq!(harness.query_by_label(complaint).is_none(), is_saved);
-        assert_eq!(folder.path().join("relief.toml").exists(), is_saved);
+        assert_eq!(folder.path().join("relief.toml").exists(), complaint.is_none());
+        assert!(complaint.is_none_or(|text| harness.query_by_label(&text).is_some()), "{name}");
     }
     assert!(!folder.path().join("relief.png").exists());
 }

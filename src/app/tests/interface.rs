@@ -345,3 +345,13 @@ fn in_a_small_window_the_object_is_large_and_panels_have_their_widths_again_afte
     harness.run_steps(3);
     assert_eq!(rects(&harness), before);
 }
+
+#[test]
+fn in_a_small_window_with_large_text_every_number_lies_within_the_window() {
+    let mut harness = harness(quick());
+    // 1024 x 700 pixels with an interface of size 1.5.
+    harness.set_size(eframe::egui::vec2(1024.0 / 1.5, 700.0 / 1.5));
+    harness.run_steps(3);
+    let numbers: Vec<_> = harness.get_all_by_role(eframe::egui::Role::SpinButton).map(|number| number.rect()).collect();
+    assert!(numbers.len() > 10 && numbers.iter().all(|rect| rect.right() <= 1024.0 / 1.5), "{numbers:?}");
+}

@@ -45,7 +45,7 @@ fn a_key_shows_the_methods_of_a_colour_map_and_an_edit_renders_them_again() {
     harness.run_steps(2);
     assert!(editor(&mut harness).methods.on);
     let images = wait(&mut harness, |images| images.len() == 3 && images[1].passes >= 3);
-    assert_eq!(names(&images), ["naive", "truth", "filtered"]);
+    assert_eq!(names(&images), ["naive", "reference", "filtered"]);
     assert!(images[1].noise.is_some_and(f32::is_finite) && images[0].difference.is_some(), "{images:?}");
     harness.run_steps(2);
     let line = harness.get_by_label("First line between methods").rect().center();
@@ -78,7 +78,7 @@ fn a_slab_has_three_methods_and_a_scene_with_neither_has_none() {
     settle(&mut harness);
     harness.get_by_label("Methods").click();
     let images = wait(&mut harness, |images| images.len() == 3 && images[2].passes >= 2);
-    assert_eq!(names(&images), ["Eq. 11", "faces", "truth"]);
+    assert_eq!(names(&images), ["Eq. 11", "faces", "reference"]);
     let mut plain = tall(quick());
     assert!(plain.query_by_label("Methods").is_none());
     plain.key_press(Key::M);

@@ -86,7 +86,9 @@ fn painted_materials_are_saved_beside_the_scene_named_in_it_and_reopened_equal()
     editor.tile.set_painting(true);
     editor.tile.brush.tool = Tool::Material;
     editor.draw(&[Vec2::splat(0.4), Vec2::splat(0.9)]);
+    assert_eq!(editor.document.base_name(), None, "no file holds the strokes");
     editor.document.save_as(&path).unwrap();
+    assert_eq!(editor.document.base_name().as_deref(), path.to_str());
     assert!(std::fs::read_to_string(&path).unwrap().contains("slot_path = \"moss_materials.png\""));
     let opened = Document::open(path.to_str().unwrap()).unwrap();
     assert_eq!(opened.scene(), editor.document.scene());

@@ -49,7 +49,7 @@ fn the_models_are_plotted_at_once_and_photons_narrow_around_them_until_the_light
     let late = wait(&mut harness, |shown| shown.truth.as_ref().is_some_and(|truth| truth.photons >= 3 * early.photons));
     let truth = late.truth.as_ref().unwrap();
     assert!(truth.noise < 0.75 * early.noise, "{early:?} {truth:?}");
-    assert_eq!(late.curves.iter().map(|curve| curve.name).collect::<Vec<_>>(), ["Eq. 11", "faces", "truth"]);
+    assert_eq!(late.curves.iter().map(|curve| curve.name).collect::<Vec<_>>(), ["Eq. 11", "faces", "reference"]);
     for name in ["Transmitted lobe", "Lobe in the plane of incidence", "Energy bar"] {
         assert!(harness.query_by_label(name).is_some(), "{name}");
     }

@@ -119,7 +119,7 @@ impl SlabLobeState {
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Lobe in the plane of incidence"));
         response.on_hover_text(
             "BTDF in the plane of incidence, by the angle of the viewer below the slab. Eq. 11: the dual-microfacet model. \
-             Faces: a sum over facets. Truth: photons, with a band of one standard error that narrows over time. Straight \
+             Faces: a sum over facets. Reference: photons, with a band of one standard error that narrows over time. Straight \
              light is left out.",
         );
         let painter = ui.painter().with_clip_rect(area);
@@ -193,7 +193,8 @@ fn energy_ui(ui: &mut Ui, shown: &SlabLobe) {
     }
     response.on_hover_text(
         "Parts of the light. Through: refracted once at each face. Bounced: transmitted after reflections inside. Straight: \
-         passed without a change of direction. Left out: what is reflected inside if Bounces is off, and what is absorbed.",
+         passed without a change of direction. Reflected: back to the side of the light. The last part is absorbed; left out \
+         if Bounces is off, with the light that is reflected inside; or not captured for a captured sheet.",
     );
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;

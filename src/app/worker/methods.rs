@@ -124,17 +124,17 @@ trait Method {
 }
 
 /// The name of the method with which the others are compared.
-const TRUTH: &str = "truth";
+const REFERENCE: &str = "reference";
 
 /// The images of all methods.
 fn shown(methods: &[Box<dyn Method + '_>; 3], means: &[MeanImage; 3], tone_map: &ToneMap) -> Vec<MethodImage> {
-    let truth = methods.iter().position(|method| method.name() == TRUTH).map(|at| &means[at]);
+    let truth = methods.iter().position(|method| method.name() == REFERENCE).map(|at| &means[at]);
     let of = |method: &dyn Method, mean: &MeanImage| MethodImage {
         name: method.name(),
         image: Arc::new(color_image(&mean.mean, tone_map)),
         passes: mean.passes,
         noise: (method.is_noisy() && mean.passes > 1).then(|| mean.noise()),
-        difference: truth.filter(|_| method.name() != TRUTH).map(|truth| mean.difference(truth)),
+        difference: truth.filter(|_| method.name() != REFERENCE).map(|truth| mean.difference(truth)),
     };
     methods.iter().zip(means).map(|(method, mean)| of(method.as_ref(), mean)).collect()
 }
@@ -229,7 +229,7 @@ impl Method for MapMethod {
     fn name(&self) -> &'static str {
         match self {
             Self::Naive(..) => "naive",
-            Self::Truth(_) => TRUTH,
+            Self::Truth(_) => REFERENCE,
             Self::Filtered(_) => "filtered",
         }
     }
@@ -311,7 +311,7 @@ impl Method for SlabMethodImage {
     }
 
     fn pass(&self, seed: u64, cancel: &Cancel) -> Result<Image> {
-        let is_truth = self.name == TRUTH;
+        let is_truth = self.name == REFERENCE;
         let mut scene = self.scene.clone();
         scene.seed = scene.seed.wrapping_add(seed);
         scene.paths = if is_truth { TRUE_PATHS } else { BTDF_PATHS };
@@ -346,7 +346,7 @@ fn slab_methods(
     Ok([
         by(pipeline, "Eq. 11", SlabMethod::Dual)?,
         by(other, "faces", SlabMethod::Faces)?,
-        by(pipeline, TRUTH, SlabMethod::Dual)?,
+        by(pipeline, REFERENCE, SlabMethod::Dual)?,
     ])
 }
 

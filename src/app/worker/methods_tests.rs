@@ -32,7 +32,7 @@ fn the_filtered_image_of_a_colour_map_is_nearer_to_the_truth_than_the_naive_one(
     );
     let images = images(&text, [48, 36], 24);
     let names: Vec<_> = images.iter().map(|image| image.name).collect();
-    assert_eq!(names, ["naive", "truth", "filtered"]);
+    assert_eq!(names, ["naive", "reference", "filtered"]);
     let [naive, truth, filtered] = &images[..] else { panic!() };
     println!("{:?} {:?} {:?}", naive.difference, truth.noise, filtered.difference);
     assert!(truth.noise.is_some_and(|noise| (1e-4..0.2).contains(&noise)), "{:?}", truth.noise);
@@ -49,7 +49,7 @@ fn slabs_by_both_models_are_near_the_truth_and_its_error_narrows() {
     );
     let few = images(&text, [40, 30], 2);
     let many = images(&text, [40, 30], 8);
-    assert_eq!(many.iter().map(|image| image.name).collect::<Vec<_>>(), ["Eq. 11", "faces", "truth"]);
+    assert_eq!(many.iter().map(|image| image.name).collect::<Vec<_>>(), ["Eq. 11", "faces", "reference"]);
     let noise = |images: &[MethodImage]| images[0].noise.unwrap();
     println!("{:?}", many.iter().map(|image| (image.noise, image.difference)).collect::<Vec<_>>());
     assert!(noise(&many) < 0.8 * noise(&few), "{} {}", noise(&many), noise(&few));

@@ -97,7 +97,7 @@ impl<'a> Truth<'a> {
     /// The lobe in the plane of incidence, linear between the middles of cells.
     pub fn curve(&self) -> LobeCurve {
         let (mut values, mut errors) = (Vec::new(), Vec::new());
-        let Some(mean) = &self.mean else { return LobeCurve { name: "truth", values, errors: None } };
+        let Some(mean) = &self.mean else { return LobeCurve { name: "reference", values, errors: None } };
         for step in 0..=STEPS {
             let at = (plane_direction(self.i, step).truncate() + 1.0) * (0.5 * SIDE as f64) - 0.5;
             let (low, f) = (at.floor().max(DVec2::ZERO), at - at.floor());
@@ -112,7 +112,7 @@ impl<'a> Truth<'a> {
             values.push(value as f32);
             errors.push(variance.sqrt() as f32);
         }
-        LobeCurve { name: "truth", values, errors: Some(errors) }
+        LobeCurve { name: "reference", values, errors: Some(errors) }
     }
 
     pub fn state(&self, models: &[(&'static str, Vec<f64>)]) -> TruthState {

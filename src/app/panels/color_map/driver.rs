@@ -43,7 +43,7 @@ pub fn ui(
             if one_ui(ui, &caption, &mut term.driver, &kinds, has_relief, context).is_some() {
                 browse = Some(Some(at));
             }
-            fields::row(ui, "Term's weight", "Factor on the driver, which counts in its deviations.", |ui| {
+            fields::row(ui, "Term's weight", "Factor on the driver, which counts in its standard deviations.", |ui| {
                 ui.add(DragValue::new(&mut term.weight).range(-1e3..=1e3).speed(0.01).max_decimals(3));
                 let removes = ui.add_enabled_ui(count > 1, |ui| ui.small_button("×").on_hover_text("Remove this term"));
                 if removes.inner.clicked() {
