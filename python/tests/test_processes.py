@@ -141,7 +141,7 @@ def test_the_package_carries_the_command(tmp_path):
     assert "fig4b_bicolor_cup" in run("materials").stdout
     assert run("--version").stdout.strip() == f"biscale {bs.__version__}"
     refused = run("render", "no_such_scene", "-o", str(tmp_path / "a.png"))
-    assert refused.returncode == 2 and "no shipped material" in refused.stderr
+    assert refused.returncode == 2 and "no shipped scene" in refused.stderr
     edit = run("edit", "default")
     assert edit.returncode == 1 and "without the editor" in edit.stderr
 

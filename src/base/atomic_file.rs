@@ -66,12 +66,12 @@ pub(crate) fn write_atomically<T>(path: &Path, content: impl FnOnce(&mut dyn Wri
 fn unwritable(error: io::Error, path: &Path) -> Error {
     error.downcast::<Error>().unwrap_or_else(|error| {
         let full = matches!(error.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded);
-        let error = if full {
-            InputError::new("output", "a full disk", "space for the file: free some, or choose another place")
-        } else {
-            InputError::new("output", error, "a place that can be written")
-        };
-        error.in_file(path).into()
+        if full {
+            // The disk is no fault of the input.
+            let expected = "space for the file: free some, or choose another place";
+            return Error::failed(InputError::new("output", "a full disk", expected).in_file(path));
+        }
+        InputError::new("output", error, "a place that can be written").in_file(path).into()
     })
 }
 

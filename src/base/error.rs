@@ -58,7 +58,7 @@ const MAX_FOUND_CHARS: usize = 400;
 const MAX_PATH_CHARS: usize = 200;
 
 /// Leaves out the middle of a long path. Both ends stay, because the end holds the name of the file.
-fn without_middle(text: &str) -> Cow<'_, str> {
+pub(crate) fn without_middle(text: &str) -> Cow<'_, str> {
     let count = text.chars().count();
     if count <= MAX_PATH_CHARS {
         return Cow::Borrowed(text);

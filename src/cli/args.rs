@@ -31,7 +31,7 @@ pub enum Command {
     Eval(EvalArgs),
     /// Write the effective BRDF as a table. Formats by ending: .npz .csv .exr .bsdf .binary .xml .bin .astm.
     Export(ExportArgs),
-    /// Filter the scene's colour map: at the queries of a CSV file, as a table, or as an image beside naive and truth.
+    /// Filter the scene's colour map: at the queries of a CSV file, as a table, or as an image beside the naive map and the reference.
     Filter(FilterArgs),
     /// Fit Lambertian + Cook-Torrance and a GGX base, print their errors, and write glTF, MaterialX or an image.
     Fit(FitArgs),
@@ -55,6 +55,26 @@ pub enum Command {
     Cache(CacheArgs),
     /// List the scenes that ship with the program.
     Materials(MaterialsArgs),
+}
+
+impl Command {
+    /// The arguments of the scene, of commands that take one.
+    pub fn scene(&self) -> Option<&SceneArgs> {
+        match self {
+            Self::Render(args) => Some(&args.scene),
+            Self::Eval(args) => Some(&args.scene),
+            Self::Export(args) => Some(&args.scene),
+            Self::Filter(args) => Some(&args.scene),
+            Self::Fit(args) => Some(&args.scene),
+            Self::Tile(args) => Some(&args.scene),
+            Self::Transmit(args) => Some(&args.scene),
+            Self::Rig(args) => Some(&args.scene),
+            Self::Plan(args) => Some(&args.scene),
+            Self::Basis(args) => Some(args),
+            Self::Profile(args) => Some(&args.scene),
+            Self::Edit { .. } | Self::Capture(_) | Self::Report(_) | Self::Cache(_) | Self::Materials(_) => None,
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -96,7 +116,7 @@ pub struct SceneArgs {
     #[arg(long)]
     pub backend: Option<BackendArg>,
     /// Seed of all sampling.
-    #[arg(long)]
+    #[arg(long, value_parser = super::parse_seed)]
     pub seed: Option<u64>,
     /// Print a machine-readable report on standard output.
     #[arg(long)]
@@ -107,6 +127,7 @@ pub struct SceneArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 pub struct PlanArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
@@ -116,6 +137,7 @@ pub struct PlanArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 pub struct RenderArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
@@ -137,6 +159,7 @@ pub struct RenderArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 pub struct EvalArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
@@ -149,7 +172,7 @@ pub struct EvalArgs {
     #[arg(short, long)]
     pub output: PathBuf,
     /// Also write the columns se_r,se_g,se_b: the standard error of a reference, or the estimated error of other
-    /// qualities. It is empty with the method of the paper.
+    /// qualities. They are empty with `wu2011`.
     #[arg(long, visible_alias = "errors")]
     pub standard_error: bool,
 }
@@ -166,6 +189,7 @@ pub enum FilterMethod {
 }
 
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 pub struct FilterArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
@@ -187,13 +211,14 @@ pub struct FilterArgs {
     /// Write the prefiltered table of a layer: .exr or .npz.
     #[arg(long, value_name = "FILE")]
     pub table: Option<PathBuf>,
-    /// Write an image (.png): naive, supersampled truth and filtered from left to right, and below them ten times the
-    /// differences from the truth.
+    /// Write an image (.png): the naive map, the supersampled reference and the filtered map from left to right, and below them
+    /// ten times the differences from the reference.
     #[arg(long, value_name = "FILE")]
     pub side_by_side: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 pub struct ExportArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
@@ -214,6 +239,7 @@ pub struct ExportArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 pub struct FitArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
@@ -262,6 +288,7 @@ pub enum TransmitMethod {
 }
 
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 pub struct TransmitArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
@@ -272,7 +299,7 @@ pub struct TransmitArgs {
     #[arg(long, default_value_t = 30.0, value_parser = super::transmit::parse_theta)]
     pub theta_i: f64,
     /// Azimuth of the light [degrees].
-    #[arg(long, default_value_t = 0.0, value_parser = super::transmit::parse_phi, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0, value_parser = super::transmit::parse_phi)]
     pub phi_i: f64,
     /// Method for the lobe; without it, the plan decides.
     #[arg(long, value_enum)]
@@ -289,6 +316,7 @@ pub enum RigSource {
 }
 
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 pub struct RigArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
@@ -304,7 +332,7 @@ pub struct RigArgs {
     /// Number of cameras: one at 45°, and one that looks straight.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2))]
     pub cameras: u8,
-    /// Relative noise of the pixels; a hundredth of it is added in the dark, relative to the brightest pixel.
+    /// Relative noise of the pixels. Every pixel also gets constant noise: a hundredth of this value times the brightest pixel.
     #[arg(long, default_value_t = 0.01, value_parser = super::parse_part)]
     pub noise: f64,
     /// The light that the photographs show.
@@ -313,20 +341,21 @@ pub struct RigArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 pub struct CaptureArgs {
     /// Folder with rig.toml and the images.
     pub folder: PathBuf,
     /// File to write (repeatable): .npz (the SVBTDF, needed), .toml (a scene that shows it), .png or .exr (residuals).
     #[arg(short, long, required = true)]
     pub output: Vec<PathBuf>,
-    /// A known part of the roughness on the side of the monitor, 0 to 1.
+    /// The known fraction of the roughness on the side of the monitor, 0 to 1.
     #[arg(long, value_parser = super::parse_part)]
     pub alpha: Option<f64>,
-    /// Fit every pixel for itself in place of 1 % of representatives.
+    /// Fit every pixel. By default, 1 % of the pixels are fitted, and the others are interpolated between them.
     #[arg(long)]
     pub every_pixel: bool,
     /// Seed of the choice of representatives.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = super::parse_seed)]
     pub seed: u64,
     /// Print a machine-readable report on standard output.
     #[arg(long)]
@@ -344,9 +373,13 @@ pub enum RadianceArg {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum EditArg {
+    /// The first number of the tile's geometry.
     Geometry,
+    /// The first number of a BRDF.
     Brdf,
+    /// The colour of the first material.
     Color,
+    /// The azimuth of the camera.
     Camera,
     /// A face of a slab.
     Face,
@@ -357,6 +390,7 @@ pub enum EditArg {
 }
 
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 pub struct ProfileArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
@@ -375,6 +409,7 @@ pub struct ProfileArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 pub struct ReportArgs {
     /// Scene files, names of shipped scenes, or `-` for a scene on standard input.
     #[arg(required = true)]

@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::Path;
 
 use crate::base::csv::CsvFile;
-use crate::base::{Error, require_finite};
+use crate::base::{Error, InputError, print_on_stderr, require_finite};
 use crate::diagnostics::Health;
 use crate::effective::{ErrorEstimate, ErrorEstimator};
 use crate::math::directions::direction_of_angles;
@@ -22,6 +22,8 @@ use super::watch::Watch;
 use super::{cache, check_outputs, print_json};
 
 const HEADER: &str = "theta_i,phi_i,theta_o,phi_o";
+/// What a polar angle of a file of directions is.
+pub(super) const POLAR_ANGLE: &str = "a polar angle in radians, from -π to π";
 
 /// Angles of one line of the file [rad].
 struct Row {
@@ -29,6 +31,8 @@ struct Row {
 }
 
 pub fn run(args: &EvalArgs) -> Result<()> {
+    args.scene.check_json(&args.output)?;
+    check_ending(&args.output)?;
     let (loaded, rows) = args.scene.open(|loaded| {
         args.scene.check_input("--pairs", &args.pairs)?;
         check_outputs(&args.scene.scene, loaded, &[&args.pairs], [&args.output])?;
@@ -48,6 +52,9 @@ pub fn run(args: &EvalArgs) -> Result<()> {
     cache::finish(&cache, args.scene.quiet);
     let Evaluation { values, errors, representation, error, health } = evaluation;
     require_finite(&values)?;
+    if !args.scene.quiet {
+        notes(&loaded, &rows, &values).iter().for_each(|note| print_on_stderr(format_args!("note: {note}")));
+    }
     if args.standard_error {
         require_finite(&errors)?;
     }
@@ -62,6 +69,29 @@ pub fn run(args: &EvalArgs) -> Result<()> {
         return print_json(&Report { output, pairs: values.len(), representation, error, health });
     }
     Ok(())
+}
+
+/// Checks that the output has no ending of a table that `export` writes.
+fn check_ending(output: &Path) -> Result<(), Error> {
+    let is_csv = output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
+    if is_csv || crate::export::check_ending(output).is_err() {
+        return Ok(());
+    }
+    let expected = "a name that ends in .csv: `biscale export` writes the other tables";
+    Err(InputError::new("output", output.display(), expected).into())
+}
+
+/// Notes about pairs whose values are 0 for a reason that the values do not show.
+fn notes(loaded: &LoadedScene, rows: &[Row], values: &[Vec3]) -> Vec<String> {
+    let is_below = |row: &&Row| row.angles[0].abs().max(row.angles[2].abs()) >= std::f64::consts::FRAC_PI_2;
+    let below = rows.iter().filter(is_below).count();
+    if loaded.scene.slab.is_some() {
+        let text = "light that keeps its direction or is mirrored by level facets is not in these values: see `biscale transmit`";
+        return if values.iter().all(|value| *value == Vec3::ZERO) { vec![text.to_owned()] } else { Vec::new() };
+    }
+    let text =
+        || format!("{below} of {} pairs have a direction at or below the horizon, where the value is 0", rows.len());
+    if below > 0 { vec![text()] } else { Vec::new() }
 }
 
 /// Values of f̄ at the pairs, and a description of the result that they come from.
@@ -204,6 +234,11 @@ impl Row {
     }
 }
 
+/// Returns true for polar angles in radians. Larger ones are likely in degrees.
+pub(super) fn is_polar_angle(angle: f64) -> bool {
+    angle.abs() <= std::f64::consts::PI + 1e-6
+}
+
 fn read(path: &Path) -> Result<Vec<Row>, Error> {
     let file = CsvFile::read(path, HEADER)?;
     let mut columns = [0; 4];
@@ -213,9 +248,16 @@ fn read(path: &Path) -> Result<Vec<Row>, Error> {
     }
     file.rows()
         .map(|row| {
+            if row.len() != file.names().len() {
+                return Err(row.length_error().into());
+            }
             let mut angles = [0.0; 4];
-            for (angle, &column) in angles.iter_mut().zip(&columns) {
-                *angle = row.number(column, "an angle in radians", |_| true)?;
+            for (at, (angle, &column)) in angles.iter_mut().zip(&columns).enumerate() {
+                *angle = if at % 2 == 0 {
+                    row.number(column, POLAR_ANGLE, is_polar_angle)?
+                } else {
+                    row.number(column, "an angle in radians", |_| true)?
+                };
             }
             Ok(Row { angles })
         })

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::base::print_on_stderr;
+use crate::base::{InputError, print_on_stderr};
 use crate::diagnostics::Health;
 use crate::effective::{ErrorEstimate, ErrorEstimator};
 use crate::export;
@@ -46,6 +46,7 @@ pub struct Report {
 }
 
 pub fn run(args: &ExportArgs) -> Result<()> {
+    args.scene.check_json(&args.output)?;
     let to_stdout = args.output == Path::new("-");
     let outputs = if to_stdout { Vec::new() } else { export::outputs(&args.output)? };
     let options = options(args)?;
@@ -85,8 +86,14 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     print_report(args, &outcome, &report)
 }
 
-/// The options of the table, checked.
+/// The options of the table, checked. A resolution is refused for the formats whose directions are fixed.
 fn options(args: &ExportArgs) -> Result<ExportOptions> {
+    if (args.resolution.is_some() || args.resolution_o.is_some()) && has_fixed_grid(args) {
+        let expected =
+            "a format whose directions are free: .npz, .csv, .exr, .bsdf, .astm, or .xml with --radiance tensor-tree";
+        let found = format!("the output {}", args.output.display());
+        return Err(crate::Error::from(InputError::new("--resolution", found, expected)).into());
+    }
     let options = ExportOptions {
         resolution: resolution(args),
         radiance: match args.radiance {
@@ -98,6 +105,16 @@ fn options(args: &ExportArgs) -> Result<ExportOptions> {
         resolution.check()?;
     }
     Ok(options)
+}
+
+/// Returns true for a format whose directions are fixed.
+fn has_fixed_grid(args: &ExportArgs) -> bool {
+    let ending = args.output.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
+    match ending.to_ascii_lowercase().as_str() {
+        "binary" | "bin" => true,
+        "xml" => matches!(args.radiance, RadianceArg::Klems),
+        _ => false,
+    }
 }
 
 /// Checks that the format suits a slab.
@@ -134,8 +151,8 @@ impl Report {
 /// The warning on a table that is read with a large error.
 fn warning(written: &ExportReport) -> Option<&'static str> {
     (!(0.0..=MAX_RESAMPLING_ERROR).contains(&written.reading.errors.rel_l2)).then_some(
-        "the table misses most of the highlights: raise --resolution or the roughness, or choose a format that adapts to \
-         lobes (.bsdf, --radiance tensor-tree)",
+        "the table misses most of the highlights: choose a format that adapts to lobes (.bsdf, --radiance tensor-tree), raise \
+         --resolution if the format has it, or raise the roughness",
     )
 }
 

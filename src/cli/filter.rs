@@ -1,5 +1,5 @@
 //! `biscale filter` evaluates filtered colour maps at queries, writes their prefiltered table, and compares them with the
-//! naive map and the truth.
+//! naive map and the reference.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use super::filter_image::{Comparison, side_by_side};
 use super::filter_queries::{Queries, evaluate};
 use super::watch::Watch;
 use super::{FilterArgs, FilterMethod, cache, check_outputs, print_json};
-use crate::base::{InputError, print_on_stderr, require_finite};
+use crate::base::{Error, InputError, print_on_stderr, require_finite};
 use crate::export::color_table;
 
 /// JSON that `--json` prints.
@@ -29,11 +29,12 @@ struct Report {
 }
 
 pub fn run(args: &FilterArgs) -> Result<()> {
+    args.output.iter().try_for_each(|output| args.scene.check_json(output))?;
     if let Some(table) = &args.table {
         color_table::check(table)?;
     }
     if let Some(image) = args.side_by_side.as_ref().filter(|path| path.extension().is_none_or(|e| e != "png")) {
-        return Err(InputError::new("--side-by-side", image.display(), "a file that ends in .png").into());
+        return Err(Error::from(InputError::new("--side-by-side", image.display(), "a file that ends in .png")).into());
     }
     let outputs: Vec<&PathBuf> = [&args.output, &args.table, &args.side_by_side].into_iter().flatten().collect();
     let inputs: Vec<&Path> = args.queries.iter().map(PathBuf::as_path).collect();
@@ -75,8 +76,7 @@ pub fn run(args: &FilterArgs) -> Result<()> {
         report.side_by_side = Some(side_by_side(path, &filter, &pipeline, &loaded, layer)?);
     }
     cache::finish(&cache, args.scene.quiet);
-    let to_stdout = args.output.as_deref() == Some(Path::new("-"));
-    if args.scene.json && !to_stdout {
+    if args.scene.json {
         return print_json(&report);
     }
     if !args.scene.quiet {

@@ -8,6 +8,7 @@ use glam::{DMat2, DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::FilterMethod;
+use super::eval::{POLAR_ANGLE, is_polar_angle};
 use crate::base::csv::{CsvFile, CsvRow};
 use crate::base::{Error, InputError, Result};
 use crate::color_map::layers::Source;
@@ -73,6 +74,8 @@ impl Queries {
             let number = |(column, name): (usize, &String)| {
                 if matches!(name.as_str(), "deviation" | "a" | "width_u" | "width_v") {
                     row.number(column, "a number that is not negative", |value| value >= 0.0)
+                } else if name.starts_with("theta") {
+                    row.number(column, POLAR_ANGLE, is_polar_angle)
                 } else {
                     row.number(column, "a number", |_| true)
                 }

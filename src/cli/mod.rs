@@ -29,7 +29,7 @@ pub mod watch;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use crate::base::{Cancel, Error, InputError, check_output, print_on_stderr};
+use crate::base::{Cancel, Error, InputError, check_output, print_on_stderr, without_middle};
 use crate::diagnostics::Health;
 use crate::pipeline::Outcome;
 use crate::scene;
@@ -48,6 +48,36 @@ pub use self::program::{main, main_of_process, no_editor};
 pub fn run(command: Command) -> Result<()> {
     #[cfg(target_os = "linux")]
     set_runtime_folder();
+    let scene = command.scene().map(|args| (args.scene.clone(), args.set.clone()));
+    run_command(command).map_err(|error| match scene {
+        Some((scene, set)) => with_scene(error, &scene, &set),
+        None => error,
+    })
+}
+
+/// An error of the input that names the scene and its key, if it is about a value of the scene or a missing file.
+fn with_scene(error: anyhow::Error, scene: &str, set: &[String]) -> anyhow::Error {
+    let mut error = match error.downcast::<Error>() {
+        Ok(Error::Input(error)) => error,
+        Ok(error) => return error.into(),
+        Err(error) => return error,
+    };
+    let is_about_option = error.place.starts_with("--") || error.place == "output";
+    if error.file.is_none() && !is_about_option {
+        error.file = Some(scene::shown_name(scene));
+    }
+    let missing = error.file.clone().filter(|file| error.place.is_empty() && !file.exists());
+    if let Some(file) = missing
+        && !scene::is_standard_input(scene)
+        && let Some(key) = scene::open_argument(scene, set).ok().and_then(|loaded| loaded.key_of_file(&file))
+    {
+        let found = format!("`{}`, which does not exist", without_middle(&file.to_string_lossy()));
+        *error = InputError::new(key, found, "a file that can be read").in_file(scene::shown_name(scene));
+    }
+    Error::Input(error).into()
+}
+
+fn run_command(command: Command) -> Result<()> {
     match command {
         Command::Edit { scene, .. } => no_editor(scene.as_deref()),
         Command::Render(args) => render::run(&args),
@@ -113,10 +143,22 @@ impl SceneArgs {
         let loaded = scene::open_argument(&self.scene, &set)?;
         let prepared = prepare(&loaded)?;
         let loaded = match self.target() {
-            Some(target) => self.choose(&loaded, target)?,
+            Some(target) => self.check_target(&loaded).and_then(|()| self.choose(&loaded, target))?,
             None => loaded,
         };
         Ok((loaded, prepared))
+    }
+
+    /// Checks that a table on standard output and the report of `--json` do not share it.
+    ///
+    /// # Errors
+    /// Both are asked for.
+    pub fn check_json(&self, output: &Path) -> Result<()> {
+        if self.json && output == Path::new("-") {
+            let expected = "a file for the table, because the report is on standard output";
+            return Err(Error::from(InputError::new("--json", "the output `-`", expected)).into());
+        }
+        Ok(())
     }
 
     /// Checks that a file of the command and the scene are not both on standard input.
@@ -131,8 +173,22 @@ impl SceneArgs {
         Ok(())
     }
 
-    fn target(&self) -> Option<Target> {
+    /// The target of the accuracy or the time, if there is one.
+    pub fn target(&self) -> Option<Target> {
         self.target_db.map(Target::Psnr).or(self.budget_ms.map(Target::Milliseconds))
+    }
+
+    /// Checks that settings can be chosen for a target: not for a slab, nor in place of a preset that was asked for.
+    fn check_target(&self, loaded: &LoadedScene) -> Result<()> {
+        let option = if self.target_db.is_some() { "--target-db" } else { "--budget-ms" };
+        let presets = "`--quality draft`, `standard` or `fine`: the others have no settings to choose";
+        let (found, expected) = match self.quality {
+            Some(QualityArg::Reference) => ("`--quality reference`", presets),
+            Some(QualityArg::Wu2011) => ("`--quality wu2011`", presets),
+            _ if loaded.scene.slab.is_some() => ("a scene with a slab", "a scene without one"),
+            _ => return Ok(()),
+        };
+        Err(Error::from(InputError::new(option, found, expected)).into())
     }
 
     /// The scene with settings that reach a target. The summary is printed even with `--quiet`, because it holds the
@@ -202,6 +258,12 @@ pub fn parse_size(text: &str) -> std::result::Result<[usize; 2], String> {
 pub fn parse_count(text: &str) -> std::result::Result<usize, String> {
     let count = text.parse::<usize>().ok().filter(|count| (16..=100_000).contains(count));
     count.ok_or_else(|| format!("found `{text}`, expected a number from 16 to 100000"))
+}
+
+/// Parses a seed.
+pub fn parse_seed(text: &str) -> std::result::Result<u64, String> {
+    let seed = text.parse::<u64>().ok().filter(|seed| i64::try_from(*seed).is_ok());
+    seed.ok_or_else(|| format!("found `{text}`, expected a whole number from 0 to {}", i64::MAX))
 }
 
 /// Parses a part from 0 to 1.

@@ -1,14 +1,17 @@
 //! The program as a function of its arguments, for the executable and for the Python package.
 
 use std::ffi::OsString;
+use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
 use anyhow::Result;
-use clap::Parser;
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser};
 
 use super::{Cli, Command, is_broken_pipe};
-use crate::base::{Error, print_on_stderr, threads};
+use crate::base::{Error, InputError, print_on_stderr, threads};
+use crate::scene;
 
 /// Runs a command line and returns the exit code of the process. `edit` opens the editor on a scene; it also gets the start of
 /// the program if the command asks for times.
@@ -17,8 +20,13 @@ pub fn main(
     edit: impl FnOnce(Option<&str>, Option<Instant>) -> Result<()>,
 ) -> u8 {
     let started = Instant::now();
-    let arguments = match Cli::try_parse_from(arguments) {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let arguments = match Cli::try_parse_from(&arguments) {
         Ok(arguments) => arguments,
+        Err(error) if error.kind() == ErrorKind::ArgumentConflict && is_unknown_command(&arguments) => {
+            print_on_stderr(format_args!("biscale: {}", unknown_command(&arguments[1].to_string_lossy())));
+            return 2;
+        }
         Err(error) => {
             // The text of `--help` goes to standard output.
             let _ = error.print();
@@ -40,8 +48,27 @@ pub fn main(
         Err(error) if is_broken_pipe(&error) => 0,
         Err(error) => {
             print_on_stderr(format_args!("biscale: {error:#}"));
-            error.downcast_ref::<Error>().map_or(1, Error::exit_code)
+            let is_input = error.downcast_ref::<InputError>().is_some();
+            error.downcast_ref::<Error>().map_or(if is_input { 2 } else { 1 }, Error::exit_code)
         }
+    }
+}
+
+/// Returns true if the first argument stands where a command would, and names neither a command nor a scene.
+fn is_unknown_command(arguments: &[OsString]) -> bool {
+    let Some(first) = arguments.get(1).map(|first| first.to_string_lossy()) else { return false };
+    !first.starts_with('-')
+        && Cli::command().find_subcommand(&*first).is_none()
+        && !Path::new(&*first).exists()
+        && scene::shipped::source(&first).is_none()
+}
+
+fn unknown_command(found: &str) -> InputError {
+    let names: Vec<String> = Cli::command().get_subcommands().map(|command| command.get_name().to_owned()).collect();
+    let error = InputError::new("", format!("the command `{found}`"), format!("one of {}", names.join(", ")));
+    match scene::nearest(found, names.iter().map(String::as_str)) {
+        Some(name) => error.with_hint(format!("did you mean `{name}`?")),
+        None => error,
     }
 }
 

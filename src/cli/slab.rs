@@ -14,7 +14,7 @@ pub fn refuse(loaded: &LoadedScene, command: &str) -> Result<()> {
         return Ok(());
     }
     let expected = format!(
-        "a scene without it: `biscale {command}` knows no slabs; `eval`, `transmit`, `render`, `export`, `fit`, `plan` and `profile` do"
+        "a scene without it: `biscale {command}` knows no slabs; `eval`, `transmit`, `render`, `export`, `fit`, `rig`, `plan` and `profile` do"
     );
     let error = InputError::new("slab", "a scene with a slab", expected).in_file(&loaded.name);
     Err(crate::Error::from(error).into())

@@ -1,6 +1,6 @@
 //! `biscale tile` writes the tile itself, to print it, to fold it, or for other programs.
 
-use crate::base::print_on_stderr;
+use crate::base::{Error, InputError, print_on_stderr};
 use crate::export::tile;
 use crate::export::tile::TileOptions;
 use anyhow::Result;
@@ -14,7 +14,14 @@ pub fn run(args: &TileArgs) -> Result<()> {
     let options =
         TileOptions { repeat: count(args.repeat), scale: args.scale, base_mm: args.base, samples: count(args.samples) };
     tile::check(&options, &args.output)?;
-    let (loaded, ()) = args.scene.open(|loaded| check_outputs(&args.scene.scene, loaded, &[], [&args.output]))?;
+    let (loaded, ()) = args.scene.open(|loaded| {
+        check_outputs(&args.scene.scene, loaded, &[], [&args.output])?;
+        if args.scene.target().is_some() {
+            let expected = "neither: the tile does not depend on the accuracy";
+            return Err(Error::from(InputError::new("--target-db or --budget-ms", "a target", expected)).into());
+        }
+        Ok(())
+    })?;
     let mesh = crate::gpu::pipeline().mesh(&loaded)?;
     let bar = progress_bar("writing", args.scene.quiet);
     let notes = tile::write(&loaded.scene, &mesh, &options, &args.output, &progress_on(&bar));

@@ -41,10 +41,12 @@ struct Parts {
     straight: DVec3,
     first_arrival_tir: Option<DVec3>,
     after_bounces: Option<DVec3>,
+    /// Light that masking removes, where it is in none of the others.
+    masked: Option<DVec3>,
 }
 
 impl Parts {
-    fn named(&self) -> [(&'static str, Option<DVec3>); 6] {
+    fn named(&self) -> [(&'static str, Option<DVec3>); 7] {
         [
             ("transmitted", Some(self.transmitted)),
             ("reflected", self.reflected),
@@ -52,6 +54,7 @@ impl Parts {
             ("straight", Some(self.straight)),
             ("first_arrival_tir", self.first_arrival_tir),
             ("after_bounces", self.after_bounces),
+            ("masked", self.masked),
         ]
     }
 }
@@ -187,6 +190,8 @@ fn model(slab: &Slab, i: DVec3) -> Transmitted {
         straight,
         first_arrival_tir: part(&|parts| parts.first_total_reflection),
         after_bounces: part(&|parts| parts.after_bounces),
+        // Half of it is in the transmitted part, and half in the reflected one.
+        masked: None,
     };
     let row = slab.row(i);
     let plane = plane_directions(i).map(|o| (o, row.btdf(o))).collect();
@@ -251,6 +256,7 @@ fn truth(loaded: &LoadedScene, outcome: &SlabOutcome, i: DVec3, cancel: &Cancel)
         straight: of_flux(&|lobe| lobe.totals.straight.value),
         first_arrival_tir: Some(of_flux(&|lobe| lobe.totals.first_total_reflection.value)),
         after_bounces: Some(all - single),
+        masked: Some(of_flux(&|lobe| lobe.totals.masked.value)),
     };
     let model = DiscLobe::transmitted(slab, i, SIDE);
     let red: Vec<f64> = model.values.iter().map(|value| value.x).collect();

@@ -25,7 +25,7 @@ impl Health {
         }
         if figures.broken > MAX_BROKEN {
             warnings.push(format!(
-                "{:.0} % of the values are saturated or no numbers and take no part: add a shorter exposure",
+                "{:.0} % of the values are saturated or not a number and are ignored: add a shorter exposure",
                 100.0 * figures.broken
             ));
         }
@@ -51,7 +51,7 @@ impl Health {
         }
         if figures.diffuse > MAX_DIFFUSE {
             warnings.push(format!(
-                "{:.0} % of the light leaves evenly: a slab describes scattering inside only roughly",
+                "{:.0} % of the light leaves with constant radiance: a slab describes scattering inside only roughly",
                 100.0 * figures.diffuse
             ));
         }

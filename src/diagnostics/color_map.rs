@@ -1,4 +1,4 @@
-//! Weaknesses of colour maps: drivers far from normal, single reads, and colours that are finer than facets.
+//! Weaknesses of colour maps: drivers far from Gaussian, single reads, and colours that are finer than facets.
 
 use glam::{DVec3, Vec2};
 
@@ -59,15 +59,15 @@ pub fn warnings(map: &LayeredMap) -> Vec<String> {
             let error = (stops.mean(&place.mips().whole()) - place.plain_mean(stops)).abs().max_element();
             if error > MAX_FAR_ERROR {
                 warnings.push(format!(
-                    "the driver of layer {name} is far from normal: its mean colour is wrong by {error:.3}; set \
+                    "the driver of layer {name} is far from Gaussian: its mean colour is wrong by {error:.3}; set \
                      gaussianize = \"auto\""
                 ));
             }
         }
         if map.taps == 1 {
             warnings.push(format!(
-                "one read of layer {name} is wrong by up to 0.06 where a pixel is as wide as its structure; set taps = 4 \
-                 or 16"
+                "one read of layer {name} is wrong by up to 0.06 where a pixel is as wide as the structure of the \
+                 texture or noise; set taps = 4 or 16"
             ));
         }
     }

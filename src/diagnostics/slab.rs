@@ -64,7 +64,7 @@ impl Health {
         let diffuse = slab.optics.diffuse.max_element();
         if diffuse > MAX_DIFFUSE {
             warnings.push(format!(
-                "{:.0} % of the light leaves evenly: a slab describes scattering inside only roughly; lower slab.diffuse",
+                "{:.0} % of the light leaves with constant radiance: a slab describes scattering inside only roughly; lower slab.diffuse",
                 percent(diffuse)
             ));
         }

@@ -87,7 +87,7 @@ fn inputs(health: &Health, warnings: &mut Vec<String>) {
         }
         if table.reciprocity_residual > MAX_ASYMMETRY {
             warnings.push(format!(
-                "`{}` changes by {} when light and viewer are swapped; the mean of both is used",
+                "`{}` changes by {} when light and viewer are swapped, and the mean of both is used: take another file if there is one",
                 table.name,
                 percent(f64::from(table.reciprocity_residual))
             ));
@@ -180,7 +180,7 @@ fn result(health: &Health, limits: Limits, conserving: bool, warnings: &mut Vec<
     }
     if result.reciprocity_residual > MAX_RESIDUAL {
         warnings.push(format!(
-            "swapping light and viewer changes the result by {} (relative L2)",
+            "swapping light and viewer changes the result by {} (relative L2): please report the scene",
             percent(result.reciprocity_residual)
         ));
     }

@@ -17,7 +17,7 @@ pub const FRAME: &str = "z up (the large-scale normal), x and y along the tile; 
 /// Origin of an exported table.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ExportMeta {
-    /// Name of the scene: the stem of a file, or a shipped material.
+    /// Name of the scene: the stem of a file, or a shipped scene.
     pub scene: String,
     /// Quality preset and representation.
     pub quality: String,

@@ -8,6 +8,7 @@ use exr::prelude as exr_file;
 use exr_file::{ReadChannels, ReadLayers};
 use glam::{UVec2, Vec3};
 use image::{DynamicImage, ImageReader, Limits};
+use tiff::decoder::DecodingResult;
 
 use crate::base::{InputError, Result};
 pub use crate::scene::Pixels;
@@ -122,8 +123,11 @@ fn read_any(base_dir: &Path, path: &Path) -> Result<RawImage> {
     let path = &files::resolve(base_dir, path);
     let error_for = |found: String| InputError::new("", found, "an image: PNG, JPEG, TIFF, HDR or EXR").in_file(path);
     let is_exr = bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]);
-    let image =
-        if is_exr { read_exr(&bytes, path)? } else { decode(&bytes).map_err(|error| error_for(error.to_string()))? };
+    let image = match read_float_tiff(&bytes) {
+        Some(image) => image,
+        None if is_exr => read_exr(&bytes, path)?,
+        None => decode(&bytes).map_err(|error| error_for(error.to_string()))?,
+    };
     check_size(image.size, path)?;
     Ok(image)
 }
@@ -150,6 +154,24 @@ fn decode(bytes: &[u8]) -> image::ImageResult<RawImage> {
     let bits = (image.color().bits_per_pixel() / u16::from(image.color().channel_count())) as u8;
     let values = image.into_rgb32f().pixels().map(|pixel| Vec3::from_array(pixel.0)).collect();
     Ok(RawImage { size, values, is_integer, bits })
+}
+
+/// Reads a TIFF file of one channel of floats, as profilometers write it and `image` does not read; `None` for other files.
+fn read_float_tiff(bytes: &[u8]) -> Option<RawImage> {
+    let mut decoder = tiff::decoder::Decoder::new(Cursor::new(bytes)).ok()?;
+    let tiff::ColorType::Gray(bits) = decoder.colortype().ok()? else { return None };
+    let size = UVec2::from(decoder.dimensions().ok()?);
+    if u64::from(size.x) * u64::from(size.y) > MAX_PIXELS {
+        return None;
+    }
+    let values: Vec<f32> = match decoder.read_image().ok()? {
+        DecodingResult::F32(values) => values,
+        DecodingResult::F64(values) => values.into_iter().map(|value| value as f32).collect(),
+        _ => return None,
+    };
+    let is_whole = values.len() == size.x as usize * size.y as usize;
+    let values = values.into_iter().map(Vec3::splat).collect();
+    is_whole.then_some(RawImage { size, values, is_integer: false, bits })
 }
 
 /// Reads R, G and B of an EXR file, or its Y channel, or its only channel.
@@ -235,6 +257,24 @@ mod tests {
         .unwrap();
         let error = read_heights(folder.path(), Path::new("h.exr")).unwrap_err().to_string();
         assert!(error.contains("pixel (1, 0)") && error.contains("finite"), "{error}");
+    }
+
+    #[test]
+    fn tiff_files_of_floats_are_read_as_exr_files_are() {
+        use tiff::encoder::{TiffEncoder, colortype};
+        let folder = tempfile::tempdir().unwrap();
+        let file = || std::fs::File::create(folder.path().join("h.tif")).unwrap();
+        let single = [0.0, 1.5, -2.25, 3.0, 1e-3, 7.0_f32];
+        TiffEncoder::new(file()).unwrap().write_image::<colortype::Gray32Float>(3, 2, &single).unwrap();
+        let read = || read_heights(folder.path(), Path::new("h.tif"));
+        let heights = read().unwrap();
+        assert_eq!((heights.size, &heights.values[..]), (UVec2::new(3, 2), &single[..]));
+        let double = single.map(f64::from);
+        TiffEncoder::new(file()).unwrap().write_image::<colortype::Gray64Float>(2, 3, &double).unwrap();
+        assert_eq!(read().unwrap().values, single);
+        let broken = [0.0, f32::NAN];
+        TiffEncoder::new(file()).unwrap().write_image::<colortype::Gray32Float>(2, 1, &broken).unwrap();
+        assert!(read().unwrap_err().to_string().contains("NaN"));
     }
 
     #[test]

@@ -107,7 +107,7 @@ impl ColorFilter {
         self.tables[layer].get_or_init(|| PrefilteredTable::new(&self.map.layers[layer].mapped.stops))
     }
 
-    /// The mean of a layer under a normal distribution in the unit of its stops.
+    /// The mean of a layer under a Gaussian distribution in the unit of its stops.
     pub fn normal(&self, layer: usize, at: &Normal) -> DVec3 {
         match self.spec.table {
             StopEvaluation::Closed => self.map.layers[layer].mapped.stops.mean(at),
@@ -295,7 +295,7 @@ impl ColorFilter {
             if n.dot(i) > 0.0 {
                 let projected = f64::from(area * n.dot(o).max(0.0) * v_o[s]);
                 seen += projected;
-                // The lower of two soft steps hides all that the higher one hides, so that along the light no visible
+                // The lower of two transitions hides all that the higher one hides, so that along the light no visible
                 // point is dark.
                 lit += f64::from(area * n.dot(o).max(0.0) * v_o[s].min(v_i[s]));
             }

@@ -336,7 +336,7 @@ fn warnings_name_drivers_that_are_not_normal_and_tiles_far_from_smith() {
     let warnings = |text: &str| Pipeline::new().color_filter(&loaded(text)).unwrap().warnings();
     assert!(warnings(&map("auto")).is_empty());
     let off = warnings(&map("off"));
-    assert!(off.len() == 1 && off[0].contains("`waves` is far from normal"), "{off:?}");
+    assert!(off.len() == 1 && off[0].contains("`waves` is far from Gaussian"), "{off:?}");
     let one = warnings(&map("auto").replace("[[color", "taps = 1\n[[color"));
     assert!(one.len() == 1 && one[0].contains("taps = 4"), "{one:?}");
     let grooves = "[tile]\ngeometry = { kind = \"grooves\", depth = 0.4 }\n[quality]\npreset = \"draft\"\n[color_map]\n\

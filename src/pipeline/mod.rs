@@ -289,7 +289,7 @@ impl Pipeline {
         times.push(("product", elapsed_ms(start)));
         let TileInputs { tile, settings, materials, facets, material_of_slot, mut plan, .. } = inputs;
         let is_low_rank = matches!(brdf.representation, Representation::LowRank(_));
-        let mut notes = notes(&tile.mesh, &facets);
+        let mut notes = notes(scene, &tile.mesh, &facets);
         notes.extend(refinement_note);
         if let Some(first) = plan.interreflection {
             let surface = VisibleSurface {
@@ -431,8 +431,13 @@ fn material_names(scene: &Scene, mesh: &TileMesh, assignment: &MaterialAssignmen
     Ok(names)
 }
 
-fn notes(mesh: &TileMesh, facets: &Facets) -> Vec<String> {
+fn notes(scene: &Scene, mesh: &TileMesh, facets: &Facets) -> Vec<String> {
     let mut notes = mesh.notes.clone();
+    for (name, slot) in scene.misspelt_materials(&mesh.slots) {
+        notes.push(format!(
+            "no part of the tile is called `{name}`, so that this material is not used (did you mean `{slot}`?)"
+        ));
+    }
     if facets.skipped_triangles > 0 {
         notes.push(format!("{} triangles have no area and were left out", facets.skipped_triangles));
     }

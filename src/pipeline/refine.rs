@@ -64,7 +64,7 @@ impl RefinedSum {
         };
         (self.refinement != Refinement::NONE).then(|| {
             format!(
-                "refined to {} facets, {azimuths} azimuths and shadows with a soft step of {:.2}°, because the estimated \
+                "refined to {} facets, {azimuths} azimuths and shadows with a transition width of {:.2}°, because the estimated \
                  error was larger than `{}` allows",
                 self.inputs.facets.len(),
                 settings.penumbra.to_degrees(),

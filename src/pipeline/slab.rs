@@ -38,8 +38,7 @@ pub(super) fn refuse_slab(loaded: &LoadedScene) -> Result<()> {
     if loaded.scene.slab.is_none() {
         return Ok(());
     }
-    let expected =
-        "a scene without it; `biscale eval`, `transmit`, `render`, `export`, `fit`, `plan` and `profile` know slabs";
+    let expected = "a scene without it; `biscale eval`, `transmit`, `render`, `export`, `fit`, `rig`, `plan` and `profile` know slabs";
     Err(InputError::new("slab", "a scene with a slab", expected).in_file(&loaded.name).into())
 }
 

@@ -39,7 +39,8 @@ impl Problem {
             && fields.iter().any(|field| field.key == key)
         {
             let outer = path_text(&self.path[..depth - 1]);
-            self.hint = Some(format!("`{key}` belongs one table up, in `[{outer}]`"));
+            let place = if outer.is_empty() { "at the top level".to_owned() } else { format!("in `[{outer}]`") };
+            self.hint = Some(format!("`{key}` belongs one table up, {place}"));
         }
         self
     }

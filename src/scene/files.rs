@@ -81,6 +81,40 @@ impl LoadedScene {
     }
 }
 
+impl LoadedScene {
+    /// The key whose value names a file at this path on disk.
+    pub fn key_of_file(&self, file: &Path) -> Option<String> {
+        let is_file = |text: &str| resolve(&self.base_dir, Path::new(text)) == file;
+        let mut key = String::new();
+        has_text(&toml::Value::Table(self.scene.to_table().ok()?), &is_file, &mut key).then_some(key)
+    }
+}
+
+/// Searches a value for a text, and appends its place to `key` if it is found.
+fn has_text(value: &toml::Value, is_wanted: &dyn Fn(&str) -> bool, key: &mut String) -> bool {
+    let length = key.len();
+    let mut is_in = |step: &str, value: &toml::Value| {
+        if !key.is_empty() {
+            key.push('.');
+        }
+        key.push_str(step);
+        let is_found = has_text(value, is_wanted, key);
+        if !is_found {
+            key.truncate(length);
+        }
+        is_found
+    };
+    match value {
+        toml::Value::String(text) => is_wanted(text),
+        toml::Value::Table(table) => table.iter().any(|(step, value)| is_in(step, value)),
+        toml::Value::Array(values) => values.iter().enumerate().any(|(index, value)| {
+            let name = value.get("name").and_then(toml::Value::as_str);
+            is_in(&name.map_or_else(|| index.to_string(), str::to_owned), value)
+        }),
+        _ => false,
+    }
+}
+
 impl Scene {
     /// The paths of all files that the scene names, but for the environment, whose name is text.
     pub fn paths_mut(&mut self) -> Vec<&mut PathBuf> {

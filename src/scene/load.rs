@@ -38,7 +38,7 @@ pub(super) struct SceneSource {
 }
 
 impl SceneSource {
-    /// The text of a file or of a shipped material.
+    /// The text of a file or of a shipped scene.
     ///
     /// # Errors
     /// There is no such scene, or the file cannot be read.
@@ -48,7 +48,7 @@ impl SceneSource {
             return Self::of_file(path);
         }
         if let Some(text) = shipped::source(scene) {
-            let file = PathBuf::from(format!("{scene} (shipped)"));
+            let file = shown_name(scene);
             return Ok(Self { text: text.to_owned(), base_dir: PathBuf::new(), name: scene.to_owned(), file });
         }
         if path.exists() {
@@ -57,7 +57,7 @@ impl SceneSource {
         }
         let error = InputError::new(
             "",
-            format!("no file and no shipped material `{scene}`"),
+            format!("no file and no shipped scene `{scene}`"),
             "a scene file or a name that `biscale materials` lists",
         );
         Err(match check::nearest(scene, shipped::names()) {
@@ -71,7 +71,9 @@ impl SceneSource {
         let file = regular_file::open(path).map_err(|error| unreadable(path, error))?;
         let length = file.metadata().map_err(|error| unreadable(path, error))?.len();
         if length > MAX_FILE {
-            return Err(unreadable(path, format!("{length} bytes")));
+            return Err(InputError::new("", format!("{length} bytes"), format!("at most {MAX_FILE} bytes"))
+                .in_file(path)
+                .into());
         }
         let text = read_text(file, path)?;
         let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
@@ -81,7 +83,7 @@ impl SceneSource {
 
     /// The text on standard input. Its relative paths start at the working directory.
     fn of_standard_input() -> Result<Self> {
-        let file = PathBuf::from("standard input");
+        let file = shown_name(STANDARD_INPUT);
         let text = read_text(std::io::stdin().lock(), &file)?;
         Ok(Self { text, base_dir: PathBuf::new(), name: "stdin".to_owned(), file })
     }
@@ -111,7 +113,7 @@ fn read_text(from: impl Read, path: &Path) -> Result<String> {
     Ok(text)
 }
 
-/// Opens `scene`, a file or the name of a shipped material, with `--set` overrides (`key.path=value`) applied.
+/// Opens `scene`, a file or the name of a shipped scene, with `--set` overrides (`key.path=value`) applied.
 ///
 /// # Errors
 /// There is no such scene, it cannot be read, or its content or an override is wrong.
@@ -130,6 +132,15 @@ pub fn open_argument(scene: &str, overrides: &[String]) -> Result<LoadedScene> {
 /// Returns true if the scene of a command is on standard input.
 pub fn is_standard_input(scene: &str) -> bool {
     scene == STANDARD_INPUT
+}
+
+/// The scene of a command as messages name it.
+pub fn shown_name(scene: &str) -> PathBuf {
+    match scene {
+        STANDARD_INPUT => PathBuf::from("standard input"),
+        _ if Path::new(scene).exists() => PathBuf::from(scene),
+        _ => PathBuf::from(format!("{scene} (shipped)")),
+    }
 }
 
 /// Loads a scene file.
@@ -237,9 +248,15 @@ pub(super) fn parse_toml(source: &str) -> Result<Table> {
 fn syntax_error(source: &str, error: &toml::de::Error) -> Error {
     let place = error.span().map(|span| format!("line {}", line_at(source, span.start))).unwrap_or_default();
     let message = error.message().replace('\n', "; ");
-    // Some messages say what was expected.
-    let (found, expected) = message.split_once(", expected ").unwrap_or((&message, "TOML"));
-    InputError::new(place, found, expected).into()
+    // Some messages say what was expected, and none quotes the text.
+    let (what, expected) = message.split_once(", expected ").unwrap_or((&message, "TOML"));
+    let text = error.span().map_or("", |span| line_text(source, span.start));
+    InputError::new(place, format!("{what} in `{text}`"), expected).into()
+}
+
+/// The line of the text at an offset, without spaces around it.
+fn line_text(source: &str, offset: usize) -> &str {
+    source.lines().nth(line_at(source, offset) - 1).unwrap_or_default().trim()
 }
 
 fn line_at(source: &str, offset: usize) -> usize {

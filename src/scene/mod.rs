@@ -40,6 +40,7 @@ use serde::{Deserialize, Serialize};
 
 pub use assignments::assignments;
 pub use background::{Background, Checkerboard, ImagePlane};
+pub(crate) use check::nearest;
 pub use color_map::{
     Blend, ColorLayer, ColorMap, Combine, Driver, DriverSum, GaussianSurface, Gaussianize, GradientStop,
     HeightDistribution, HeightDriver, LayerWeight, MAX_CELLS, NoiseBasis, NoiseDriver, SlopeAlong, Steepness,
@@ -48,7 +49,9 @@ pub use color_map::{
 pub use editable::{EditableScene, SceneBundle};
 pub use effects::{Effects, Switch};
 pub use key_list::{KeyEntry, keys_of};
-pub use load::{LoadedScene, is_standard_input, load, load_with_overrides, open, open_argument, parse, parse_table};
+pub use load::{
+    LoadedScene, is_standard_input, load, load_with_overrides, open, open_argument, parse, parse_table, shown_name,
+};
 pub use material::{BrdfSpec, MAX_COLOR, MaterialSpec, TermSpec};
 pub use painted::{Painted, Pixels};
 pub use quality::{BACKENDS, INTERPOLATIONS, METHODS, PRESETS, Quality, VISIBILITIES};
@@ -182,11 +185,14 @@ impl Scene {
         }
         let find = |name: &str| self.materials.iter().position(|material| material.name == name);
         let index = find(slot).or_else(|| find(DEFAULT_MATERIAL)).ok_or_else(|| {
-            let names: Vec<String> = self.materials.iter().map(|material| material.name.clone()).collect();
-            let error =
-                InputError::new("material", names.join(", "), format!("a material `{slot}` or `{DEFAULT_MATERIAL}`"));
-            match check::nearest(slot, names.iter().map(String::as_str)) {
-                Some(name) => error.with_hint(format!("did you mean `{name}`?")),
+            let names: Vec<String> = self.materials.iter().map(|material| format!("`{}`", material.name)).collect();
+            let expected = match slot {
+                DEFAULT_MATERIAL => format!("a material `{DEFAULT_MATERIAL}`"),
+                _ => format!("a material `{slot}` or `{DEFAULT_MATERIAL}`"),
+            };
+            let error = InputError::new("material", names.join(", "), expected);
+            match check::nearest(slot, self.materials.iter().map(|material| &*material.name)) {
+                Some(name) => error.with_hint(format!("if `{name}` is meant for this part, call it `{slot}`")),
                 None => error,
             }
         })?;
@@ -203,6 +209,15 @@ impl Scene {
             )
         })?;
         Ok(SlotMaterial { index: Some(index), name: &material.name, brdf, color: material.color })
+    }
+
+    /// Materials that no slot uses and whose names resemble that of a slot without a material of its own: `(name, slot)`.
+    pub fn misspelt_materials<'a>(&'a self, slots: &'a [String]) -> Vec<(&'a str, &'a str)> {
+        let has = |slot: &str| self.materials.iter().any(|material| material.name == slot);
+        let free = || slots.iter().map(String::as_str).filter(|slot| !has(slot));
+        let names = self.materials.iter().map(|material| &*material.name);
+        let unused = names.filter(|name| *name != DEFAULT_MATERIAL && !slots.iter().any(|slot| slot == name));
+        unused.filter_map(|name| Some((name, check::nearest(name, free())?))).collect()
     }
 
     /// Checks rules that relate several fields, which the catalogue cannot express.

@@ -129,7 +129,10 @@ fn set_in_list(entries: &mut Vec<Value>, keys: &[&str], value: &Value) -> std::r
         set_in_value(entry, rest, value)
     };
     if key == "*" {
-        return entries.iter_mut().try_for_each(set);
+        // A material without a BRDF has that of `default`, which is an entry, too.
+        let is_inherited = |entry: &Value| rest.len() > 1 && rest[0] == "brdf" && entry.get("brdf").is_none();
+        let all_inherit = entries.iter().all(is_inherited);
+        return entries.iter_mut().filter(|entry| all_inherit || !is_inherited(entry)).try_for_each(set);
     }
     let count = entries.len();
     if let Ok(index) = key.parse::<usize>() {
@@ -141,9 +144,15 @@ fn set_in_list(entries: &mut Vec<Value>, keys: &[&str], value: &Value) -> std::r
     if let Some(entry) = entries.iter_mut().find(|entry| name_of(entry).as_deref() == Some(key)) {
         return set(entry);
     }
-    // A name similar to an existing one is a typing error; any other name creates a new material.
+    // A name similar to an existing one is a typing error; any other name creates a new material. `paint_1` and `paint_2`
+    // are two names.
     let names: Vec<String> = entries.iter().filter_map(name_of).collect();
-    if let Some(name) = names.iter().find(|name| strsim::damerau_levenshtein(name, key) <= 2) {
+    let is_typing_error = |name: &&String| {
+        let [text, other] =
+            [name.as_str(), key].map(|name| name.trim_end_matches(|letter: char| letter.is_ascii_digit()));
+        (text != other || text.len() == name.len().min(key.len())) && strsim::damerau_levenshtein(name, key) <= 2
+    };
+    if let Some(name) = names.iter().find(is_typing_error) {
         return Err((
             format!("`{key}`"),
             format!("one of {}", names.join(", ")),
@@ -191,6 +200,8 @@ fn set_brdf_file_or_kind(material: &mut Table, field: &str, value: &Value) -> st
             Some("bsdf") => Some("rgl"),
             Some("binary") => Some("merl"),
             _ if measured => None,
+            Some("bin") => Some("utia"),
+            Some("npz") => Some("npz"),
             _ => Some("merl"),
         };
         if let Some(kind) = by_ending {

@@ -51,8 +51,10 @@ fn overrides_replace_an_analytic_brdf_by_a_measured_one_in_several_ways() {
             }
         }
     }
-    let scene = set(TWO_COLOURS, &["material.default.brdf.path=x.bsdf"]).unwrap();
-    assert_eq!(scene.materials[0].brdf.as_ref().unwrap().terms()[0].kind(), "rgl");
+    for (file, kind) in [("x.bsdf", "rgl"), ("x.bin", "utia"), ("x.npz", "npz")] {
+        let scene = set(TWO_COLOURS, &[&format!("material.default.brdf.path={file}")]).unwrap();
+        assert_eq!(scene.materials[0].brdf.as_ref().unwrap().terms()[0].kind(), kind);
+    }
 }
 
 #[test]
@@ -108,4 +110,21 @@ fn files_named_on_the_command_line_are_found_from_the_working_directory() {
     assert!(path.is_absolute());
     let scene = set(TWO_COLOURS, &["material.default.brdf.path=no/such.binary"]).unwrap();
     assert_eq!(scene.materials[0].brdf.as_ref().unwrap().terms()[0], TermSpec::Merl { path: "no/such.binary".into() });
+}
+
+#[test]
+fn numbered_materials_are_added_beside_each_other_and_all_brdfs_leave_out_materials_without_one() {
+    let source = format!("{GROOVES}[[material]]\nname = \"default\"\nbrdf = {{ kind = \"ggx\" }}\n");
+    let set = |texts: &[&str]| set(&source, texts);
+    let scene =
+        set(&["material.paint_1.color=0.1", "material.paint_2.color=0.2", "material.*.brdf.roughness=0.4"]).unwrap();
+    assert_eq!(
+        scene.materials.iter().map(|material| &*material.name).collect::<Vec<_>>(),
+        ["default", "paint_1", "paint_2"]
+    );
+    assert!(scene.materials[1].brdf.is_none(), "it has the BRDF of `default`");
+    let error = set(&["material.sides.color=0.1", "material.side.color=0.2"]).unwrap_err().to_string();
+    assert!(error.contains("did you mean `sides`"), "{error}");
+    let error = set(&["material.paint_1.color=0.1", "material.pain_1.color=0.2"]).unwrap_err().to_string();
+    assert!(error.contains("did you mean `paint_1`"), "{error}");
 }

@@ -73,7 +73,7 @@ scene_table! {
         /// Number of paths per shading point for what is seen through a slab; 0: filtered lookups per point.
         #[serde(skip_serializing_if = "Option::is_none")]
         paths: Option<usize> = None, FieldShape::Integer { min: 0, max: 1_000_000 }, "";
-        /// Width of the soft transition of visibility at a horizon.
+        /// Transition width of visibility at a horizon.
         #[serde(skip_serializing_if = "Option::is_none")]
         penumbra_deg: Option<f32> = None, number(0.0, 45.0), "degrees";
     }

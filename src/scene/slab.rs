@@ -37,11 +37,11 @@ scene_table! {
         thickness: f32 = 0.0, length(0.0, 2.0), "tile units";
         /// Absorption along the refracted ray.
         #[serde(with = "color")] absorption: Vec3 = Vec3::ZERO, FieldShape::Color { max: 1e6 }, "per tile unit";
-        /// Part of the light that leaves the other side evenly.
+        /// Fraction of the light that leaves the other side with constant radiance.
         #[serde(with = "color")] diffuse: Vec3 = Vec3::ZERO, FieldShape::Color { max: 1.0 }, "";
         /// Method for light that meets rough facets on both faces: auto, dual (one formula) or faces (a sum).
         method: SlabMethod = SlabMethod::Auto, FieldShape::Choice(SlabMethod::NAMES), "";
-        /// Part of the roughness on top, 0 (all below) to 1 (all on top); auto: by the variances of the slopes.
+        /// Fraction of the roughness on top, 0 (all below) to 1 (all on top); auto: by the variances of the slopes.
         alpha: Alpha = Alpha::Auto, ALPHA, "";
         /// Light that is reflected between the faces: on, or off as in the paper.
         bounces: Switch = Switch::On, BOUNCES, "";

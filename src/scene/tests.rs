@@ -172,7 +172,23 @@ fn a_slot_has_its_own_material_or_the_default_or_is_an_error() {
 
     let scene = parse(&format!("{GROOVES}{bottom}brdf = {{ kind = \"ggx\" }}\n")).unwrap();
     let message = scene.material_for_slot("botom").unwrap_err().to_string();
-    assert!(message.contains("`botom` or `default`") && message.contains("did you mean `bottom`?"), "{message}");
+    assert!(message.contains("`botom` or `default`") && message.contains("call it `botom`"), "{message}");
+}
+
+#[test]
+fn an_unused_material_whose_name_resembles_that_of_a_slot_is_misspelt() {
+    let slots = ["bottom", "sides"].map(str::to_owned);
+    let named = |names: &[&str]| {
+        let of = |name: &&str| format!("[[material]]\nname = \"{name}\"\nbrdf = {{ kind = \"lambertian\" }}\n");
+        let materials: String = names.iter().map(of).collect();
+        let scene = parse(&format!("{GROOVES}{materials}")).unwrap();
+        let found = scene.misspelt_materials(&slots);
+        found.into_iter().map(|(name, slot)| format!("{name}/{slot}")).collect::<Vec<_>>()
+    };
+    assert_eq!(named(&["default", "side"]), ["side/sides"]);
+    assert_eq!(named(&["default", "Bottom", "sides"]), ["Bottom/bottom"]);
+    assert!(named(&["default", "side", "sides", "bottom"]).is_empty(), "all slots have materials");
+    assert!(named(&["default", "paint_1", "gold"]).is_empty());
 }
 
 #[test]

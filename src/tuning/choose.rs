@@ -91,9 +91,9 @@ impl Chosen {
 const FIRST_LEVEL: f64 = 7.0;
 /// Coarsest quality level for a PSNR: 64 facets. Six replicates of fewer than ten facets do not show the error of their sum.
 const COARSEST_LEVEL: f64 = 2.0;
-/// PSNR that a quality level more usually gains [dB]: the error falls with about the 0.75th power of the number of facets.
+/// Usual gain of PSNR from one quality level to the next finer one [dB]: the error falls with about the 0.75th power of the number of facets.
 const DB_PER_LEVEL: f64 = 4.5;
-/// Range of the PSNR that a quality level more is taken to gain, where two stated errors show it [dB].
+/// Range of this gain where two stated errors show it [dB].
 const MIN_DB_PER_LEVEL: f64 = 3.0;
 const MAX_DB_PER_LEVEL: f64 = 9.0;
 /// Largest step between quality levels. Larger steps would overshoot: on smooth tiles errors fall faster.

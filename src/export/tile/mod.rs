@@ -193,7 +193,7 @@ fn millimetres(unit: &str) -> Result<f64> {
         "um" | "µm" | "μm" | "micron" | "micrometre" | "micrometer" => 1e-3,
         "nm" => 1e-6,
         "in" | "inch" => 25.4,
-        _ => return Err(InputError::new("tile.unit", unit, "mm, cm, m, µm, nm or inch, to know the size").into()),
+        _ => return Err(InputError::new("tile.unit", unit, "mm, cm, m, µm, nm or in, to know the size").into()),
     })
 }
 

@@ -84,7 +84,8 @@ pub fn build(spec: &Grooves, size: Vec2) -> TileMesh {
     let wave = Wave::snapped(spec.count, spec.rotation_deg, size);
     let mut builder = MeshBuilder::new(size, &["bottom", "sides"]);
     let rotation_error_deg = (wave.rotation_deg() - f64::from(spec.rotation_deg) + 180.0).rem_euclid(360.0) - 180.0;
-    if rotation_error_deg.abs() > 0.05 || spec.rotation_deg != 0.0 {
+    let straight_pitch = f64::from(size.x) / f64::from(spec.count);
+    if rotation_error_deg.abs() > 0.05 || (wave.pitch() / straight_pitch - 1.0).abs() > 1e-3 {
         builder.note(format!(
             "grooves run at {:.2} degrees, {:.4} apart, so that the tile repeats (asked for: {} degrees)",
             wave.rotation_deg(),
@@ -92,8 +93,34 @@ pub fn build(spec: &Grooves, size: Vec2) -> TileMesh {
             spec.rotation_deg
         ));
     }
+    if let Some(angle) = steeper_side_deg(spec, wave.pitch()) {
+        builder.note(format!(
+            "the sides of the grooves stand at {angle:.1} degrees, because wider sides would overlap (asked for: {} degrees)",
+            spec.side_angle_deg
+        ));
+    }
     extrude(&mut builder, &wave, &profile(spec, wave.pitch()));
     builder.finish()
+}
+
+/// The horizontal length of a side as its angle asks for, and the largest that fits, as fractions of the pitch; `None` for
+/// profiles without such sides.
+fn side_run(spec: &Grooves, pitch: f64) -> Option<[f64; 2]> {
+    let bottom = match spec.profile {
+        GrooveProfile::V => 0.0,
+        GrooveProfile::Trapezoid => f64::from(spec.bottom_width),
+        GrooveProfile::U | GrooveProfile::Rectangular => return None,
+    };
+    let angle = f64::from(spec.side_angle_deg);
+    let run = if angle > 89.99 { 0.0 } else { f64::from(spec.depth) / angle.to_radians().tan() };
+    Some([run / pitch, 0.5 * (1.0 - bottom)])
+}
+
+/// The angle of sides that are steeper than their angle asks for by a tenth of a degree or more.
+fn steeper_side_deg(spec: &Grooves, pitch: f64) -> Option<f64> {
+    let [asked, largest] = side_run(spec, pitch)?;
+    let angle = (f64::from(spec.depth) / (asked.min(largest) * pitch)).atan().to_degrees();
+    (asked > largest && angle - f64::from(spec.side_angle_deg) >= 0.1).then_some(angle)
 }
 
 /// The cross-section over one period, from phase 0 to phase 1. The groove is in the middle, with land at z = 0 on both
@@ -104,12 +131,7 @@ fn profile(spec: &Grooves, pitch: f64) -> Vec<ProfilePoint> {
         GrooveProfile::V => 0.0,
         _ => f64::from(spec.bottom_width),
     };
-    let slope_run =
-        if spec.side_angle_deg > 89.99 { 0.0 } else { depth / f64::from(spec.side_angle_deg).to_radians().tan() };
-    let run = match spec.profile {
-        GrooveProfile::V | GrooveProfile::Trapezoid => (slope_run / pitch).min(0.5 * (1.0 - bottom)),
-        GrooveProfile::U | GrooveProfile::Rectangular => 0.0,
-    };
+    let run = side_run(spec, pitch).map_or(0.0, |[asked, largest]| asked.min(largest));
     let mut points = vec![(0.0, 0.0, SIDES)];
     if spec.profile == GrooveProfile::U {
         points.extend((0..=ARC_SEGMENTS).map(|k| {

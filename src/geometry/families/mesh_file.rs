@@ -45,12 +45,17 @@ pub fn build(spec: &MeshFile, size: Vec2, base_dir: &Path) -> Result<TileMesh> {
     mesh.positions = file.positions;
     crate::geometry::check_extent(&mesh).map_err(|error| error.in_file(&path))?;
     mesh.closes_plane = closure::is_closed_sheet(&mesh);
-    if !mesh.closes_plane {
+    let covered = closure::signed_projected_area(&mesh) / f64::from(mesh.base_area());
+    if covered < 0.0 {
+        let name = spec.path.display();
         mesh.notes.push(format!(
-            "{} is not one closed sheet over the tile ({} open edges, {:.4} of the base area): its projected area is measured",
+            "the triangles of {name} face down and reflect nothing upwards: reverse the order of their corners"
+        ));
+    } else if !mesh.closes_plane {
+        mesh.notes.push(format!(
+            "{} is not one closed sheet over the tile ({} open edges, {covered:.4} of the base area): its projected area is measured",
             spec.path.display(),
             closure::open_edges(&mesh),
-            closure::signed_projected_area(&mesh) / f64::from(mesh.base_area()),
         ));
     }
     Ok(mesh)

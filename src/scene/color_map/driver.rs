@@ -61,7 +61,7 @@ scene_table! {
 scene_table! {
     /// The height of the surface.
     HeightDriver {
-        /// Deviation of an independent normal offset.
+        /// Standard deviation of an independent Gaussian offset.
         noise: f32 = 0.0, number(0.0, 1e3), "deviations of the heights";
     }
 }
@@ -111,8 +111,11 @@ impl Driver {
     /// The catalogue of all drivers.
     pub fn kinds() -> Vec<Kind> {
         let terms = FieldShape::List { of: &TERM, min: 1, max: 8 };
-        let terms =
-            Field::required("terms", terms, "Terms `{ driver, weight }`; each driver counts in its deviations.");
+        let terms = Field::required(
+            "terms",
+            terms,
+            "Terms `{ driver, weight }`; each driver counts in its standard deviations.",
+        );
         let mut kinds = Self::linear_kinds();
         kinds.push(Kind { kind: "steepness", doc: "The length of the slope.", fields: Vec::new() });
         kinds.push(Kind { kind: "sum", doc: "A weighted sum of standardized drivers.", fields: vec![terms] });

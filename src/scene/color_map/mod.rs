@@ -50,7 +50,7 @@ scene_choice! {
 }
 
 scene_choice! {
-    /// Method for the mean of a map under a normal distribution.
+    /// Method for the mean of a map under a Gaussian distribution.
     StopEvaluation {
         /// In closed form from the stops.
         Closed = "closed",
@@ -194,7 +194,7 @@ impl ColorLayer {
                 "",
                 FieldShape::Choice(StopUnit::NAMES),
                 None,
-                "Unit of the stops: deviation (deviations from the driver's mean) or value (the driver's own unit).",
+                "Unit of the stops: deviation (standard deviations from the driver's mean) or value (the driver's own unit).",
             ),
             Field::required("stops", STOPS, "Ascending stops `[value, [r, g, b]]`; two equal values are a jump."),
             Field::new(

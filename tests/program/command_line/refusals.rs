@@ -83,6 +83,8 @@ fn bad_pairs_are_refused_with_their_line() {
         ("theta_i,phi_i,theta_o,phi_o\n0,0,0,0\n0,0,x,0\n", &["line 3", "`x`", "theta_o"]),
         ("theta_i,phi_i,theta_o,phi_o\n0,0,nan,0\n", &["line 2", "nan"]),
         ("theta_i,phi_i,theta_o,phi_o\n0,0,0\n", &["line 2", "3 values", "4 values"]),
+        ("theta_i,phi_i,theta_o,phi_o\n0,0,0,0,0\n", &["line 2", "5 values", "4 values"]),
+        ("theta_i,phi_i,theta_o,phi_o\n0.1,0,30,180\n", &["line 2", "`30` for theta_o", "radians"]),
     ] {
         folder.write("pairs.csv", text);
         let mut all = vec!["pairs.csv"];
@@ -91,6 +93,47 @@ fn bad_pairs_are_refused_with_their_line() {
     }
     folder.assert_refused(&["eval", "flat.toml", "--pairs", "none.csv", "-o", "out.csv"], &["none.csv"]);
     assert!(!folder.path("out.csv").exists());
+}
+
+#[test]
+fn a_missing_file_is_named_with_the_scene_and_the_key_that_name_it() {
+    let folder = CommandLine::new();
+    folder.write("pairs.csv", PAIRS);
+    let heights = "[tile]\ngeometry = { kind = \"heightfield\", path = \"none.png\" }\n";
+    let measured = FLAT.replace("{ kind = \"lambertian\"", "{ kind = \"merl\", path = \"none.binary\" }\n#");
+    for (text, key) in [(heights, "tile.geometry.path"), (&measured, "material.default.brdf.path")] {
+        folder.write("scene.toml", text);
+        let parts = ["scene.toml", key, "`none.", "which does not exist"];
+        folder.assert_refused(&["eval", "scene.toml", "--pairs", "pairs.csv", "-o", "out.csv"], &parts);
+    }
+}
+
+#[test]
+fn options_that_exclude_each_other_are_refused() {
+    let folder = CommandLine::new();
+    folder.write("flat.toml", FLAT);
+    folder.write("pairs.csv", PAIRS);
+    let eval = ["eval", "flat.toml", "--pairs", "pairs.csv"];
+    folder.assert_refused(&[&eval[..], &["-o", "-", "--json"]].concat(), &["--json", "standard output"]);
+    folder.assert_refused(&["export", "flat.toml", "-o", "-", "--json"], &["--json", "standard output"]);
+    folder.assert_refused(&[&eval[..], &["-o", "out.npz"]].concat(), &["out.npz", ".csv", "biscale export"]);
+    let target = ["-o", "out.csv", "--target-db", "40", "--quality", "wu2011"];
+    folder.assert_refused(&[&eval[..], &target].concat(), &["--target-db", "wu2011"]);
+    folder.assert_refused(&["tile", "flat.toml", "-o", "t.obj", "--target-db", "40"], &["--target-db", "tile"]);
+    folder.assert_refused(
+        &["export", "flat.toml", "-o", "a.binary", "--resolution", "6x6"],
+        &["--resolution", "a.binary"],
+    );
+    folder.assert_refused(&["filter", "flat.toml", "--side-by-side", "a.jpg"], &["--side-by-side", ".png"]);
+    folder
+        .assert_refused(&[&eval[..], &["-o", "out.csv", "--seed", "-1"]].concat(), &["--seed", "`-1`", "whole number"]);
+    assert_eq!(folder.files(), ["flat.toml", "pairs.csv"]);
+}
+
+#[test]
+fn a_misspelt_command_is_named_with_its_nearest() {
+    let folder = CommandLine::new();
+    folder.assert_refused(&["rendr", "default", "-o", "x.png"], &["the command `rendr`", "did you mean `render`"]);
 }
 
 #[test]
