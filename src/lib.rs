@@ -15,6 +15,17 @@
 //! - [`pipeline::Pipeline::color_filter`] filters the colour map of a tile ([`color_map`]),
 //! - [`render::render`] renders an object, [`export`] writes tables, [`reference`] checks them by ray casting.
 //!
+//! ```
+//! let mut loaded = biscale::scene::open("fig5c_uneven", &[])?;
+//! loaded.scene.quality.preset = "draft".to_owned();
+//! let outcome = biscale::pipeline::Pipeline::new().effective(&loaded)?;
+//! let [light, viewer] = [0.3, 0.5].map(|theta| biscale::math::directions::from_angles(theta, 0.0));
+//! // The effective BRDF [1/sr], with the light's cosine.
+//! assert!(outcome.brdf.eval(light, viewer).x > 0.0);
+//! # Ok::<(), biscale::Error>(())
+//! ```
+//! Without its default features the crate needs no window, GPU or command line.
+//!
 //! Modules are declared from the lowest layer to the highest; a module imports only from the layers above its line.
 #![allow(
     rustdoc::broken_intra_doc_links,

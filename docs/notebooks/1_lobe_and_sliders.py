@@ -52,9 +52,9 @@ print(brdf.form)
 # %% [markdown]
 # ## The lobe
 #
-# The light is fixed, and the viewer moves over the hemisphere. The left picture looks at the hemisphere from above: the centre is the
+# The light is fixed, and the viewer moves over the hemisphere. The left image looks at the hemisphere from above: the centre is the
 # normal, the rim is the horizon, and the cross marks the direction in which a mirror would reflect the light. Brightness is the logarithm
-# of the mean of the three channels. The right picture is the section through the normal and the light.
+# of the mean of the three channels. The right image is the section through the normal and the light.
 
 
 # %%

@@ -13,10 +13,10 @@
 #
 # An effective BRDF is a BRDF like any other, so that every renderer that reads tables can show it. For Mitsuba 3 there are two ways: the
 # plugin `biscale`, which computes the BRDF of a scene when Mitsuba loads it, and a file for Mitsuba's own material `measured`. This notebook
-# renders shot silk on a sphere both ways, compares the pictures with biscale's own, and changes the weave from Python.
+# renders shot silk on a sphere both ways, compares the images with biscale's own, and changes the weave from Python.
 #
 # It needs `biscale`, `mitsuba` (3.7 or newer) and matplotlib. With an LLVM library Mitsuba evaluates all rays at once; without one, it calls
-# the plugin for each ray, so that this notebook renders smaller and noisier pictures.
+# the plugin for each ray, so that this notebook renders smaller and noisier images.
 
 # %%
 import tempfile
@@ -37,7 +37,7 @@ SIZE, SPP = (200, 16) if FAST else (48, 2)
 print(mi.variant())
 
 # %% [markdown]
-# ## The picture
+# ## The image
 #
 # Shot silk: warp threads in red and weft threads in blue cross each other. Threads are too thin to see, but each kind has a highlight of its
 # own, so that the hue changes with the direction.
@@ -97,7 +97,7 @@ by_file = rendered(sphere({"type": "measured", "filename": str(folder / "silk.bs
 # %% [markdown]
 # ## The same in biscale
 #
-# `scene.render` shades the scene's own object. These keys select the same sphere, light and camera. All three pictures show the same function
+# `scene.render` shades the scene's own object. These keys select the same sphere, light and camera. All three images show the same function
 # $\bar f$. They differ by the interpolation in the tables, and by the rays at the outline, which is left out of the comparison.
 
 # %%

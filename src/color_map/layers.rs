@@ -34,7 +34,7 @@ pub struct SurfacePoint {
 #[derive(Debug, Clone)]
 pub enum Source {
     Place(Arc<PlaceDriver>),
-    /// Height, with an independent normal offset of this deviation [deviations of the heights].
+    /// Height, with an independent Gaussian offset of this standard deviation [deviations of the heights].
     Height {
         noise: f64,
     },

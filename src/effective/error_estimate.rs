@@ -3,8 +3,8 @@
 //! Facets are divided into replicates, each of which is a systematic sample of the whole surface. Their spread shows how
 //! the error of the facets is distributed over direction pairs. Its size follows from the difference from a second sample
 //! of fewer facets, because replicates are less even than the whole sample. Visibility from a half and from a quarter
-//! of the azimuths shows the order and the error of interpolation between azimuths (Richardson 1911), and a soft step of
-//! half the width that of the soft step. Pairs of nearly equal directions are examined more often than they are drawn. The
+//! of the azimuths shows the order and the error of interpolation between azimuths (Richardson 1911). Visibility with
+//! half the transition width shows the error of the transition. Pairs of nearly equal directions are examined more often than they are drawn. The
 //! stated error of the whole BRDF is [`SAFETY_FACTOR`] times the estimate.
 
 use std::sync::Arc;
@@ -54,11 +54,12 @@ pub(crate) const SECOND_SAMPLE_DIVISOR: usize = 2;
 const LEAST_ORDER: f64 = 1.0;
 const TYPICAL_ORDER: f64 = 1.5;
 const MOST_ORDER: f64 = 2.0;
-/// Variance of a sum over systematic samples, relative to random ones, on many tiles; and the weight of this value against
-/// that of a tile. The tile's own value comes from a single difference of samples, which may be small by chance.
+/// Typical variance of a sum over systematic samples, relative to one over random samples, on many tiles; and its weight
+/// in the mean with the value of one tile. That value comes from a single difference of samples, which may be small by
+/// chance.
 const TYPICAL_VARIANCE: f64 = 0.2;
 const TYPICAL_WEIGHT: f64 = 0.3;
-/// Resolutions that show the error of visibility: a half and a quarter of the azimuths, and a soft step of half the
+/// Resolutions that show the error of visibility: a half and a quarter of the azimuths, and half the transition
 /// width.
 const HALF: Resolution = Resolution { azimuth_step: 2, softness: 1.0 };
 const QUARTER: Resolution = Resolution { azimuth_step: 4, softness: 1.0 };
@@ -82,7 +83,7 @@ pub struct ErrorEstimate {
     pub psnr_db: Option<f64>,
     /// Relative L2 of the error of the facets.
     pub facets: f64,
-    /// Relative L2 of the error of visibility: between azimuths and of the soft step.
+    /// Relative L2 of the error of visibility: between azimuths and of the transition.
     pub visibility: f64,
     /// Relative L2 of the low-rank factors against the direct sum.
     pub table: f64,
@@ -91,7 +92,7 @@ pub struct ErrorEstimate {
     /// The part of `visibility` that is due to the number of azimuths.
     #[serde(skip)]
     pub azimuths: f64,
-    /// The part of `visibility` that is due to the width of the soft step.
+    /// The part of `visibility` that is due to the width of the transition.
     #[serde(skip)]
     pub soft_step: f64,
 }
@@ -132,7 +133,7 @@ pub struct ErrorEstimator {
     replicates: Vec<(Vec<usize>, FacetSum)>,
     /// Ratio of the error of interpolation between azimuths to its difference from that of half of the azimuths.
     azimuth_ratio: f64,
-    /// Ratio of the error of the soft step to its difference from that of half the width.
+    /// Ratio of the error of the transition to its difference from that of half the width.
     soft_step_ratio: f64,
     /// Variance of `f̄` relative to what the spread of the replicates would show if they were random samples.
     variance_ratio: f64,
@@ -154,7 +155,7 @@ struct Deviations {
     /// Near retroreflection, `f̄` with `v_i (1 - v_i)` in place of `v_i v_o`: it shows how much of the visibility is a blend
     /// of two azimuths. Fewer azimuths give blends as well, so that `coarse` does not show this error.
     blended: DVec3,
-    /// `f̄` with a soft step of half the width less `f̄`.
+    /// `f̄` with a transition of half the width less `f̄`.
     sharper: DVec3,
     /// `f̄` of the second sample less `f̄`.
     second: DVec3,

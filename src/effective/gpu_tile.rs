@@ -40,7 +40,7 @@ pub struct SliceInput {
     pub grid: Arc<PeriodicGrid>,
     pub facets: Arc<Facets>,
     pub azimuths: usize,
-    /// Width of the soft step at a horizon [rad].
+    /// Width of the transition at a horizon [rad].
     pub transition_width: f32,
     /// True if the tile may have overhangs.
     pub overhangs: bool,
@@ -53,7 +53,7 @@ pub struct HeightMarchInput {
     pub tile_size: Vec2,
     pub facets: Arc<Facets>,
     pub azimuths: usize,
-    /// Width of the soft step at a horizon [rad].
+    /// Width of the transition at a horizon [rad].
     pub transition_width: f32,
 }
 

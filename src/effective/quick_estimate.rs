@@ -11,7 +11,7 @@ use crate::visibility::Resolution;
 
 /// Numbers of direction pairs.
 const QUICK_PAIRS: PairCount = PairCount { min: 16, min_effective: 1.5 };
-/// Fewer azimuths and a wider soft step at once.
+/// Fewer azimuths and a wider transition at once.
 const COARSE: Resolution = Resolution { azimuth_step: 2, softness: 2.0 };
 
 /// Estimates `rel_l2` and `psnr_db` of a direct sum from few pairs, in a small part of the time of an edit. The parts are

@@ -22,7 +22,8 @@ use crate::visibility::Visibility;
 
 /// Groups of rays per matrix product.
 const BLOCK: usize = 512;
-/// Groups that are walked again for their variance, and most groups for one that is.
+/// Number of groups that are walked a second time to estimate the variance, and the largest number of groups that one of
+/// them stands for.
 const EXAMINED: usize = 1024;
 const MOST_PER_EXAMINED: usize = 8;
 /// Variance of the stratified rays relative to independent ones, on many tiles.

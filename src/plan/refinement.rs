@@ -13,7 +13,7 @@ const MAX_STEP: usize = 8;
 const MAX_AZIMUTHS: usize = 384;
 /// Largest factor by which refinement raises the product of facets and azimuths, and so the time of visibility.
 const MAX_WORK: usize = 32;
-/// Largest factor by which refinement narrows the soft step. `standard` then has a tenth of a degree.
+/// Largest factor by which refinement narrows the transition. `standard` then has a tenth of a degree.
 const MAX_SHARPNESS: usize = 8;
 
 /// Rings of the tables of interreflection to which refinement goes.
@@ -26,7 +26,7 @@ const MAX_RAYS_STEP: usize = 4;
 pub struct Refinement {
     pub facets: usize,
     pub azimuths: usize,
-    /// The soft step is narrower by this factor.
+    /// The transition is narrower by this factor.
     pub sharpness: usize,
 }
 

@@ -70,7 +70,7 @@ pub struct Settings {
     pub map_grid: PolarGrid,
     /// Texels per side of the shadow maps that these maps are made from.
     pub map_resolution: u32,
-    /// Width of the soft step at a horizon [rad].
+    /// Width of the transition at a horizon [rad].
     pub penumbra: f32,
     pub visibility_method: VisibilityMethod,
     /// Bins of normals whose facets share one lobe; `None` to keep each normal.
@@ -327,7 +327,7 @@ impl Settings {
     pub fn interreflection(&self, features: &SceneFeatures) -> InterreflectionSettings {
         /// Smallest share that is computed with four times the rays and the finer table: what `draft` may leave out.
         const LARGE_SHARE: f64 = 0.35;
-        /// Share of matte facets below which the coarsest table suffices.
+        /// Share of interreflection below which the coarsest table suffices, if all facets are matte.
         const SMALL_SHARE: f64 = 0.2;
         /// Smallest roughness of lobes in the coarser tables.
         const WIDE_LOBE: f32 = 0.2;

@@ -11,7 +11,7 @@ pub struct Optics {
     pub thickness: f64,
     /// Absorption along a ray inside [1 / tile unit].
     pub absorption: DVec3,
-    /// Part of the light that leaves the other side evenly (`ρ_d`, Eq. 13).
+    /// Fraction of the light that leaves the other side with constant radiance (`ρ_d`, Eq. 13).
     pub diffuse: DVec3,
 }
 

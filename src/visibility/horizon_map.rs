@@ -66,10 +66,10 @@ fn sine(x: f32) -> f32 {
 }
 
 impl HorizonMap {
-    /// A slope so low that the soft step stays below elevation 0 for the widest transition, by more than rounding:
+    /// A slope so low that the transition stays below elevation 0 for the widest transition, by more than rounding:
     /// tan(-0.02).
     const FREE: f32 = -0.020_002_667;
-    /// A slope so high that the soft step never reaches the zenith. It is finite, so that its product with 0 is 0.
+    /// A slope so high that the transition never reaches the zenith. It is finite, so that its product with 0 is 0.
     pub(super) const BLOCKED: f32 = 1e9;
     /// Smallest cosine of an elevation. Times [`HorizonMap::BLOCKED`] it is far above 1, so that blocked facets are
     /// blocked at the zenith.
@@ -146,7 +146,7 @@ impl HorizonMap {
         Self { azimuths, facets, transition_width, slopes, truncated, weights: SineWeights::new(azimuths) }
     }
 
-    /// Clamps a width of the soft step [rad] to the range that a horizon map supports.
+    /// Clamps a width of the transition [rad] to the range that a horizon map supports.
     pub(crate) fn clamped_width(transition_width: f32) -> f32 {
         transition_width.clamp(1e-6, 0.04)
     }

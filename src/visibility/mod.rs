@@ -51,7 +51,7 @@ pub(crate) const MIN_SLOPE: f32 = 0.005;
 pub(crate) struct Resolution {
     /// Every `azimuth_step`-th azimuth is read. It divides their number.
     pub azimuth_step: usize,
-    /// Factor of the width of the soft step.
+    /// Factor of the width of the transition.
     pub softness: f32,
 }
 

@@ -18,7 +18,7 @@ use crate::math::simd::{F32x8Array, HorizonTaps};
 /// All blocked slopes of every facet along a number of azimuths, exact at these azimuths.
 ///
 /// Between azimuths the slope of the horizon is interpolated, unless it jumps to another part of the surface. At such jumps, and for
-/// overhangs, each facet switches from one azimuth to the next over a soft step.
+/// overhangs, each facet switches from one azimuth to the next over a transition.
 #[derive(Debug, Clone)]
 pub struct OcclusionIntervals {
     pub(crate) horizon_map: HorizonMap,
@@ -106,7 +106,7 @@ impl OcclusionIntervals {
         blocked.steps as f64 / (sampled.max(1) * AZIMUTHS) as f64
     }
 
-    /// Cuts the mesh along every azimuth for every facet. Visibility has soft steps of `transition_width` radians.
+    /// Cuts the mesh along every azimuth for every facet. Visibility has transitions of `transition_width` radians.
     pub fn scan(grid: &PeriodicGrid, facets: &Facets, azimuths: usize, transition_width: f32) -> Self {
         Self::scan_between(None, grid, facets, azimuths, transition_width)
     }

@@ -28,7 +28,7 @@ const RIPPLES: &str = "{ kind = \"heightfield\", path = \"asset:ripples.png\", h
 const WEAVE: &str = "{ kind = \"weave\", pattern = \"plain\" }";
 
 /// Largest difference of values of a table, relative to the value plus the mean of its column. Both sides sum in single
-/// precision and round directions to 2e-7 rad. The soft step of a facet, 1/50 rad wide, turns that into 1e-5 of its
+/// precision and round directions to 2e-7 rad. The transition of a facet, 1/50 rad wide, turns that into 1e-5 of its
 /// area, and a lobe of width α into 4e-7/α. The tests print the differences.
 const TABLE_TOLERANCE: f32 = 3e-5;
 /// The same for surfaces with vertical walls. Beside a wall the slope of a horizon is up to some thousand, and changes as

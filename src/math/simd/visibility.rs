@@ -44,7 +44,7 @@ fn soft(x: f32) -> f32 {
 }
 
 multiversion! {
-    /// `out` is 1 above and 0 below the horizon that is interpolated between two azimuths, with a soft step between.
+    /// `out` is 1 above and 0 below the horizon that is interpolated between two azimuths, with a transition between.
     pub fn horizon_visibility(from: &[f32], to: &[f32], taps: &HorizonTaps, out: &mut [f32]) {
         for ((out, &from), &to) in out.iter_mut().zip(from).zip(to) {
             *out = soft(taps.between(from, to));

@@ -57,7 +57,7 @@ const EVEN_SIZE: [usize; 2] = [32, 16];
 const LEAST_COSINE: f32 = 0.02;
 
 impl BackdropKernel {
-    /// Variance that is read over that which was asked for, on the plane if it is `below`.
+    /// Ratio of the variance that is read to the one requested: for the plane if `below` is true, else for the environment.
     pub fn share(&self, below: bool) -> f32 {
         let plane = self.plane.as_ref().filter(|_| below);
         plane.or(self.environment.as_ref()).map_or(1.0, |kernel| kernel.share)

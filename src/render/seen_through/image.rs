@@ -281,8 +281,8 @@ impl PathKernels {
     }
 }
 
-/// The matrix M that contracts directions of paths about the mean, with `M C Mᵀ = C - part λ I`, for the covariance C and its smaller variance λ: the variance that round
-/// footprints of this size add.
+/// The matrix M that contracts directions of paths about the mean, with `M C Mᵀ = C - part λ I`, for the covariance C and
+/// its smaller variance λ: the variance that round footprints of this size add.
 fn contraction([xx, xy, yy]: [f32; 3], part: f32) -> [f32; 3] {
     let (middle, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
     let radius = (half * half + xy * xy).sqrt();

@@ -39,7 +39,8 @@ const ALPHA_TOLERANCE: f64 = 0.01;
 /// Shift of the mean direction that Eq. 18 cannot tell from 0, over the deviation of the directions: the sum over dots is no
 /// integral.
 const SHIFT: f64 = 0.005;
-/// Squared error at held-out samples of the free distribution over that of the symmetric one below which it is taken. A free
+/// Largest ratio of the squared errors of the free and the symmetric distribution at held-out samples at which the free one
+/// is taken. A free
 /// distribution may also fit what an inexact α leaves, and then is worse at other views.
 const FREE_IS_BETTER: f64 = 0.4;
 /// Part of the span outside which a distribution must not grow, and the largest growth of its mass there.

@@ -11,7 +11,7 @@ pub struct Sample {
     pub i: DVec3,
     /// Irradiance of a dot of intensity 1. It is also the solid angle that the sample stands for, up to a common factor.
     pub irradiance: f64,
-    /// BTDF [1/sr]. Values that are no numbers take no part.
+    /// BTDF [1/sr]. Values that are not a number are ignored.
     pub btdf: f64,
 }
 
@@ -64,7 +64,7 @@ pub enum Symmetry {
     WhereUnseen,
 }
 
-/// Part of the peak that weighs a half.
+/// Fraction of the peak at which a sample has the weight 1/2.
 const FLOOR: f64 = 0.01;
 /// Least BTDF in the logarithm, over the floor.
 const LEAST: f64 = 0.1;

@@ -22,7 +22,7 @@ pub struct Point {
     pub color: DVec3,
     /// `ρ_d` [1/sr] (Eq. 14).
     pub diffuse: DVec3,
-    /// Part of the values that are no numbers.
+    /// Part of the values that are not a number.
     pub broken: f64,
 }
 

@@ -36,7 +36,7 @@ const LOWEST: f64 = 0.05;
 const PER_CELL: usize = 8;
 const LEAST_CELLS: usize = 20;
 
-/// Eq. 14: the diffuse part of the BTDF, from the samples of each camera. Values that are no numbers take no part; 0 without any.
+/// Eq. 14: the diffuse part of the BTDF, from the samples of each camera. Values that are not a number are ignored; 0 without any.
 ///
 /// The paper takes the least of all values whose radiance exceeds 0.05 of the mean, against noise. A sheet without a diffuse
 /// part has no dark value there, and the least of noisy values is too small. Here, the dots of at least the median

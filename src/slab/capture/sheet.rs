@@ -72,7 +72,7 @@ pub struct Figures {
     pub diffuse: f64,
     /// Number of dots across a lobe, median.
     pub dots_across: f64,
-    /// Part of the values that are saturated or no numbers.
+    /// Part of the values that are saturated or not a number.
     pub broken: f64,
     /// Part of the pixels without a lobe.
     pub dark: f64,

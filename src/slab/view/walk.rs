@@ -9,14 +9,14 @@ use crate::effective::{PathEnd, PathKind, Viewer};
 use crate::math::simd::{LANES, RayLane, enter_lane, facing_sum, leave_lane, mask_lane};
 use crate::slab::{Channel, Straight, straight};
 
-/// Every so many paths, one also follows the light that the top reflects. At grazing views each path does, because the
+/// One path in this many also follows the light that the top reflects. At grazing views each path does, because the
 /// reflected part then differs from facet to facet.
 const REFLECTED_EVERY: usize = 2;
 /// Light that the bottom reflects in steps of this weight is followed: facets that reflect little stand for others.
 const BOUNCED_STEP: f32 = 0.25;
 /// Cosine of the viewer below which a view is grazing.
 const GRAZING: f32 = 0.6;
-/// Facets of which light inside meets one, chosen by their areas as the light sees them. The variance of the area of a
+/// Number of candidate facets, of which light inside meets one, chosen by their areas as the light sees them. The variance of the area of a
 /// single facet of GGX is infinite.
 const CANDIDATES: usize = 16;
 /// Cosine below which light inside is so steep that it meets one of several candidates.

@@ -176,7 +176,7 @@ fn measured(
     }
     for theta in POLAR {
         let viewers = Viewers::new(reflectance, theta.to_radians());
-        // Points of the surface, whose mean is `f̄`, tell by how much the places of the pixels are off.
+        // Points of the surface have the mean `f̄`. Their deviation from it is the sampling error that the pixels share.
         let points = viewers.values(tile, materials, 0.0);
         for (level, corrections) in levels.iter().zip(&mut corrections) {
             cancel.check()?;
