@@ -135,7 +135,7 @@ print("as shipped:", bs.Scene(NAME).effective(quality="draft").health["warnings"
 bright = bs.Scene.parse(
     """
     [tile]
-    geometry = { kind = "grooves", profile = "v", count = 4, depth = 0.06, side_angle_deg = 25 }
+    geometry = { kind = "grooves", profile = "v", count = 4, depth = 0.06, side_angle_deg = 25.6 }
     [[material]]
     name = "default"
     brdf = [{ kind = "lambertian", albedo = 0.9 }, { kind = "ggx", roughness = 0.3, f0 = 0.5 }]

@@ -194,7 +194,6 @@ impl Editor {
         match self.document.save_as(path) {
             Ok(()) => {
                 self.messages.clear("save");
-                self.settings.files = path.parent().map(Path::to_owned);
                 if let Some(recovery) = &self.recovery {
                     recovery.clear();
                 }

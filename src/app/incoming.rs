@@ -71,7 +71,13 @@ impl Editor {
                 }
                 None => return self.execute_now(ctx, Action::OpenFile(path)),
             },
-            Purpose::SaveScene => return self.save(&path),
+            Purpose::SaveScene => {
+                self.save(&path);
+                if !self.document.is_dirty() {
+                    self.settings.files = path.parent().map(Path::to_owned);
+                }
+                return;
+            }
             Purpose::Capture => {
                 self.capture.open(path.parent().map(Path::to_owned).unwrap_or_default());
                 return;
@@ -118,7 +124,7 @@ impl Editor {
                 return;
             }
             Purpose::ExportSweep => {
-                let Some(base) = self.document.base_name() else { return };
+                let base = self.document.base_name().unwrap_or_else(|| self.document.name.clone());
                 let sweep = Sweep::new(&scene, base, self.material_ms());
                 self.dialog = Some(Dialog::Sweep { path, sweep });
                 return;

@@ -168,8 +168,9 @@ impl Editor {
     /// Lists the warnings, each with a button that shows where its remedy is.
     fn warnings_ui(&mut self, ui: &mut Ui) {
         for warning in &self.object.warnings {
-            // A sentence of its own here, and on the command line the rest of a line.
-            ui.label(capitalized(&warning.replace('`', "")));
+            // The command line quotes names, and puts `warning:` before the text. The names themselves stay as they are.
+            let text = warning.replace('`', "");
+            ui.label(if warning.starts_with('`') { text } else { capitalized(&text) });
             let (tab, section) = place_of_remedy(warning);
             if ui.button("Show").on_hover_text(format!("Open {section} of the parameters")).clicked() {
                 (self.tab, self.reveal) = (tab, Some(section));

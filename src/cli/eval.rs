@@ -87,7 +87,11 @@ fn notes(loaded: &LoadedScene, rows: &[Row], values: &[Vec3]) -> Vec<String> {
     let below = rows.iter().filter(is_below).count();
     if loaded.scene.slab.is_some() {
         let text = "light that keeps its direction or is mirrored by level facets is not in these values: see `biscale transmit`";
-        return if values.iter().all(|value| *value == Vec3::ZERO) { vec![text.to_owned()] } else { Vec::new() };
+        return if !values.is_empty() && values.iter().all(|value| *value == Vec3::ZERO) {
+            vec![text.to_owned()]
+        } else {
+            Vec::new()
+        };
     }
     let text =
         || format!("{below} of {} pairs have a direction at or below the horizon, where the value is 0", rows.len());

@@ -92,7 +92,8 @@ fn options(args: &ExportArgs) -> Result<ExportOptions> {
         let expected =
             "a format whose directions are free: .npz, .csv, .exr, .bsdf, .astm, or .xml with --radiance tensor-tree";
         let found = format!("the output {}", args.output.display());
-        return Err(crate::Error::from(InputError::new("--resolution", found, expected)).into());
+        let option = if args.resolution.is_some() { "--resolution" } else { "--resolution-o" };
+        return Err(crate::Error::from(InputError::new(option, found, expected)).into());
     }
     let options = ExportOptions {
         resolution: resolution(args),

@@ -55,21 +55,22 @@ pub fn run(command: Command) -> Result<()> {
     })
 }
 
-/// An error of the input that names the scene and its key, if it is about a value of the scene or a missing file.
+/// Adds the scene's name to an error about one of its keys, and name and key to one about a missing file of the scene.
 fn with_scene(error: anyhow::Error, scene: &str, set: &[String]) -> anyhow::Error {
     let mut error = match error.downcast::<Error>() {
         Ok(Error::Input(error)) => error,
         Ok(error) => return error.into(),
         Err(error) => return error,
     };
-    let is_about_option = error.place.starts_with("--") || error.place == "output";
-    if error.file.is_none() && !is_about_option {
+    let first = error.place.split('.').next().unwrap_or_default();
+    if error.file.is_none() && scene::Scene::fields().iter().any(|field| field.key == first) {
         error.file = Some(scene::shown_name(scene));
     }
-    let missing = error.file.clone().filter(|file| error.place.is_empty() && !file.exists());
-    if let Some(file) = missing
+    let is_missing = |file: &PathBuf| error.place.is_empty() && matches!(file.try_exists(), Ok(false));
+    if let Some(file) = error.file.clone().filter(is_missing)
         && !scene::is_standard_input(scene)
-        && let Some(key) = scene::open_argument(scene, set).ok().and_then(|loaded| loaded.key_of_file(&file))
+        && let Ok(loaded) = scene::open_argument(scene, set)
+        && let Some(key) = loaded.key_of_file(&file)
     {
         let found = format!("`{}`, which does not exist", without_middle(&file.to_string_lossy()));
         *error = InputError::new(key, found, "a file that can be read").in_file(scene::shown_name(scene));
@@ -181,10 +182,10 @@ impl SceneArgs {
     /// Checks that settings can be chosen for a target: not for a slab, nor in place of a preset that was asked for.
     fn check_target(&self, loaded: &LoadedScene) -> Result<()> {
         let option = if self.target_db.is_some() { "--target-db" } else { "--budget-ms" };
-        let presets = "`--quality draft`, `standard` or `fine`: the others have no settings to choose";
-        let (found, expected) = match self.quality {
-            Some(QualityArg::Reference) => ("`--quality reference`", presets),
-            Some(QualityArg::Wu2011) => ("`--quality wu2011`", presets),
+        let presets = "`draft`, `standard` or `fine`: the others have no settings to choose";
+        let (found, expected) = match &*loaded.scene.quality.preset {
+            "reference" => ("the preset `reference`", presets),
+            "wu2011" => ("the preset `wu2011`", presets),
             _ if loaded.scene.slab.is_some() => ("a scene with a slab", "a scene without one"),
             _ => return Ok(()),
         };

@@ -23,7 +23,10 @@ pub fn main(
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     let arguments = match Cli::try_parse_from(&arguments) {
         Ok(arguments) => arguments,
-        Err(error) if error.kind() == ErrorKind::ArgumentConflict && is_unknown_command(&arguments) => {
+        Err(error)
+            if matches!(error.kind(), ErrorKind::ArgumentConflict | ErrorKind::UnknownArgument)
+                && is_unknown_command(&arguments) =>
+        {
             print_on_stderr(format_args!("biscale: {}", unknown_command(&arguments[1].to_string_lossy())));
             return 2;
         }

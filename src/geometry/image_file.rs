@@ -9,6 +9,7 @@ use exr_file::{ReadChannels, ReadLayers};
 use glam::{UVec2, Vec3};
 use image::{DynamicImage, ImageReader, Limits};
 use tiff::decoder::DecodingResult;
+use tiff::tags::{SampleFormat, Tag};
 
 use crate::base::{InputError, Result};
 pub use crate::scene::Pixels;
@@ -123,7 +124,7 @@ fn read_any(base_dir: &Path, path: &Path) -> Result<RawImage> {
     let path = &files::resolve(base_dir, path);
     let error_for = |found: String| InputError::new("", found, "an image: PNG, JPEG, TIFF, HDR or EXR").in_file(path);
     let is_exr = bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]);
-    let image = match read_float_tiff(&bytes) {
+    let image = match read_float_tiff(&bytes, path)? {
         Some(image) => image,
         None if is_exr => read_exr(&bytes, path)?,
         None => decode(&bytes).map_err(|error| error_for(error.to_string()))?,
@@ -157,21 +158,26 @@ fn decode(bytes: &[u8]) -> image::ImageResult<RawImage> {
 }
 
 /// Reads a TIFF file of one channel of floats, as profilometers write it and `image` does not read; `None` for other files.
-fn read_float_tiff(bytes: &[u8]) -> Option<RawImage> {
-    let mut decoder = tiff::decoder::Decoder::new(Cursor::new(bytes)).ok()?;
-    let tiff::ColorType::Gray(bits) = decoder.colortype().ok()? else { return None };
-    let size = UVec2::from(decoder.dimensions().ok()?);
-    if u64::from(size.x) * u64::from(size.y) > MAX_PIXELS {
-        return None;
-    }
-    let values: Vec<f32> = match decoder.read_image().ok()? {
+///
+/// # Errors
+/// The file is such a file, but it is damaged or too large.
+fn read_float_tiff(bytes: &[u8], path: &Path) -> Result<Option<RawImage>> {
+    let Ok(mut decoder) = tiff::decoder::Decoder::new(Cursor::new(bytes)) else { return Ok(None) };
+    let format = decoder.find_tag(Tag::SampleFormat).ok().flatten().and_then(|format| format.into_u16_vec().ok());
+    let is_float = format.is_some_and(|format| format == [SampleFormat::IEEEFP.to_u16()]);
+    let (Ok(tiff::ColorType::Gray(bits)), true) = (decoder.colortype(), is_float) else { return Ok(None) };
+    let error_for = |found: tiff::TiffError| InputError::new("", found, "a TIFF file of floats").in_file(path);
+    let size = UVec2::from(decoder.dimensions().map_err(error_for)?);
+    check_size(size, path)?;
+    let values: Vec<f32> = match decoder.read_image().map_err(error_for)? {
+        DecodingResult::F16(values) => values.into_iter().map(|value| value.to_f32()).collect(),
         DecodingResult::F32(values) => values,
         DecodingResult::F64(values) => values.into_iter().map(|value| value as f32).collect(),
-        _ => return None,
+        _ => return Ok(None),
     };
     let is_whole = values.len() == size.x as usize * size.y as usize;
     let values = values.into_iter().map(Vec3::splat).collect();
-    is_whole.then_some(RawImage { size, values, is_integer: false, bits })
+    Ok(is_whole.then_some(RawImage { size, values, is_integer: false, bits }))
 }
 
 /// Reads R, G and B of an EXR file, or its Y channel, or its only channel.
@@ -275,6 +281,12 @@ mod tests {
         let broken = [0.0, f32::NAN];
         TiffEncoder::new(file()).unwrap().write_image::<colortype::Gray32Float>(2, 1, &broken).unwrap();
         assert!(read().unwrap_err().to_string().contains("NaN"));
+        let large = vec![0.0_f32; 5000];
+        TiffEncoder::new(file()).unwrap().write_image::<colortype::Gray32Float>(5000, 1, &large).unwrap();
+        assert!(read().unwrap_err().to_string().contains("5000 x 1 pixels"));
+        let whole = std::fs::read(folder.path().join("h.tif")).unwrap();
+        std::fs::write(folder.path().join("h.tif"), &whole[..whole.len() / 2]).unwrap();
+        assert_eq!(read().unwrap_err().exit_code(), 2);
     }
 
     #[test]

@@ -82,8 +82,11 @@ impl LoadedScene {
 }
 
 impl LoadedScene {
-    /// The key whose value names a file at this path on disk.
+    /// The key whose value names a file of the scene, by the path of the file on disk.
     pub fn key_of_file(&self, file: &Path) -> Option<String> {
+        if !self.files().iter().any(|one| one == file) {
+            return None;
+        }
         let is_file = |text: &str| resolve(&self.base_dir, Path::new(text)) == file;
         let mut key = String::new();
         has_text(&toml::Value::Table(self.scene.to_table().ok()?), &is_file, &mut key).then_some(key)

@@ -138,8 +138,10 @@ pub fn is_standard_input(scene: &str) -> bool {
 pub fn shown_name(scene: &str) -> PathBuf {
     match scene {
         STANDARD_INPUT => PathBuf::from("standard input"),
-        _ if Path::new(scene).exists() => PathBuf::from(scene),
-        _ => PathBuf::from(format!("{scene} (shipped)")),
+        _ if !Path::new(scene).is_file() && shipped::source(scene).is_some() => {
+            PathBuf::from(format!("{scene} (shipped)"))
+        }
+        _ => PathBuf::from(scene),
     }
 }
 

@@ -217,7 +217,9 @@ impl Scene {
         let free = || slots.iter().map(String::as_str).filter(|slot| !has(slot));
         let names = self.materials.iter().map(|material| &*material.name);
         let unused = names.filter(|name| *name != DEFAULT_MATERIAL && !slots.iter().any(|slot| slot == name));
-        unused.filter_map(|name| Some((name, check::nearest(name, free())?))).collect()
+        // The rule of overrides, which take such a name for a typing error.
+        let is_near = |name: &str, slot: &str| strsim::damerau_levenshtein(&name.to_lowercase(), slot) <= 2;
+        unused.filter_map(|name| Some((name, free().find(|slot| is_near(name, slot))?))).collect()
     }
 
     /// Checks rules that relate several fields, which the catalogue cannot express.

@@ -5,7 +5,7 @@ use std::path::Path;
 use toml::{Table, Value};
 
 use super::check::PathStep;
-use super::{Driver, Geometry, Kind, SlabFace, TermSpec};
+use super::{DEFAULT_MATERIAL, Driver, Geometry, Kind, SlabFace, TermSpec};
 use crate::base::{Error, InputError, Result};
 
 /// Applies one override. Lists are indexed by number, by `name`, or by `*` for every entry; missing tables are created.
@@ -129,10 +129,13 @@ fn set_in_list(entries: &mut Vec<Value>, keys: &[&str], value: &Value) -> std::r
         set_in_value(entry, rest, value)
     };
     if key == "*" {
-        // A material without a BRDF has that of `default`, which is an entry, too.
-        let is_inherited = |entry: &Value| rest.len() > 1 && rest[0] == "brdf" && entry.get("brdf").is_none();
-        let all_inherit = entries.iter().all(is_inherited);
-        return entries.iter_mut().filter(|entry| all_inherit || !is_inherited(entry)).try_for_each(set);
+        // A material without a BRDF has that of `default`, which is changed as well.
+        let is_default = |entry: &Value| entry.get("name").and_then(Value::as_str) == Some(DEFAULT_MATERIAL);
+        let inherits = entries.iter().any(|entry| is_default(entry) && entry.get("brdf").is_some());
+        let skips = |entry: &Value| {
+            inherits && rest.len() > 1 && rest[0] == "brdf" && entry.is_table() && entry.get("brdf").is_none()
+        };
+        return entries.iter_mut().filter(|entry| !skips(entry)).try_for_each(set);
     }
     let count = entries.len();
     if let Ok(index) = key.parse::<usize>() {

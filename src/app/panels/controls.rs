@@ -204,11 +204,17 @@ fn color_ui(ui: &mut Ui, value: &mut Value, max: f64, wrong: &Cell<bool>) {
         return;
     }
     let decimals = if width < WIDTHS[1] { 2 } else { 3 };
-    ui.spacing_mut().interact_size.x = width;
+    let least_width = std::mem::replace(&mut ui.spacing_mut().interact_size.x, width);
     for channel in &mut rgb {
+        let (exact, step) = (*channel, 10.0_f32.powi(decimals as i32));
         let drag = DragValue::new(channel).range(0.0..=max as f32).speed(0.005).max_decimals(decimals);
         ui.add_sized([width, ui.spacing().interact_size.y], finite(drag, wrong));
+        // A number that loses the focus has the decimals that it shows, which is no edit.
+        if (*channel - (exact * step).round() / step).abs() < 1e-6 {
+            *channel = exact;
+        }
     }
+    ui.spacing_mut().interact_size.x = least_width;
     if rgb != before && rgb.iter().all(|channel| channel.is_finite()) {
         *value = color_value(rgb);
     }

@@ -116,7 +116,7 @@ fn side_run(spec: &Grooves, pitch: f64) -> Option<[f64; 2]> {
     Some([run / pitch, 0.5 * (1.0 - bottom)])
 }
 
-/// The angle of sides that are steeper than their angle asks for by a tenth of a degree or more.
+/// The angle of the sides if it exceeds `side_angle_deg` by a tenth of a degree or more.
 fn steeper_side_deg(spec: &Grooves, pitch: f64) -> Option<f64> {
     let [asked, largest] = side_run(spec, pitch)?;
     let angle = (f64::from(spec.depth) / (asked.min(largest) * pitch)).atan().to_degrees();

@@ -106,6 +106,25 @@ fn a_missing_file_is_named_with_the_scene_and_the_key_that_name_it() {
         let parts = ["scene.toml", key, "`none.", "which does not exist"];
         folder.assert_refused(&["eval", "scene.toml", "--pairs", "pairs.csv", "-o", "out.csv"], &parts);
     }
+    folder.write("scene.toml", heights.replace("none.png", "asset:riples.png"));
+    folder.assert_refused(&["plan", "scene.toml"], &["no asset `riples.png`", "did you mean `asset:ripples.png`"]);
+}
+
+#[test]
+fn an_error_names_the_scene_only_if_it_is_about_a_key_of_the_scene() {
+    let folder = CommandLine::new();
+    folder.write("flat.toml", FLAT);
+    for (arguments, part) in [
+        (&["plan", "no_such_scene"][..], "(shipped)"),
+        (&["tile", "flat.toml", "-o", "t.obj", "--scale", "1e9"], "flat.toml:"),
+        (&["export", "flat.toml", "-o", "a.npz", "--resolution", "5000x8"], "flat.toml:"),
+    ] {
+        folder.assert_refused(arguments, &["found"]);
+        let message = String::from_utf8_lossy(&folder.run(arguments).stderr).into_owned();
+        assert!(!message.contains(part), "{arguments:?}: {message}");
+    }
+    let unit = ["tile", "flat.toml", "-o", "t.stl", "--set", "tile.unit=furlong"];
+    folder.assert_refused(&unit, &["flat.toml: tile.unit", "furlong"]);
 }
 
 #[test]
@@ -133,7 +152,9 @@ fn options_that_exclude_each_other_are_refused() {
 #[test]
 fn a_misspelt_command_is_named_with_its_nearest() {
     let folder = CommandLine::new();
-    folder.assert_refused(&["rendr", "default", "-o", "x.png"], &["the command `rendr`", "did you mean `render`"]);
+    for arguments in [&["rendr", "default", "-o", "x.png"][..], &["rendr", "-o", "x.png", "default"]] {
+        folder.assert_refused(arguments, &["the command `rendr`", "did you mean `render`"]);
+    }
 }
 
 #[test]
