@@ -20,6 +20,7 @@ pub mod zip;
 pub use atomic_file::replace_file;
 pub use cancel::{Cancel, Running};
 pub use console::print_on_stderr;
+#[cfg(feature = "cli")]
 pub(crate) use error::without_middle;
 pub use error::{Error, InputError, Result};
 pub use finite::require_finite;

@@ -22,7 +22,7 @@ use super::watch::Watch;
 use super::{cache, check_outputs, print_json};
 
 const HEADER: &str = "theta_i,phi_i,theta_o,phi_o";
-/// What a polar angle of a file of directions is.
+/// The range of polar angles in files, for messages.
 pub(super) const POLAR_ANGLE: &str = "a polar angle in radians, from -π to π";
 
 /// Angles of one line of the file [rad].

@@ -40,6 +40,7 @@ use serde::{Deserialize, Serialize};
 
 pub use assignments::assignments;
 pub use background::{Background, Checkerboard, ImagePlane};
+#[cfg(feature = "cli")]
 pub(crate) use check::nearest;
 pub use color_map::{
     Blend, ColorLayer, ColorMap, Combine, Driver, DriverSum, GaussianSurface, Gaussianize, GradientStop,

@@ -59,7 +59,7 @@ fn bezout_solves_its_equation() {
 fn sides_that_would_overlap_are_steeper_and_a_note_says_so() {
     let spec = Grooves { depth: 0.2, side_angle_deg: 60.0, bottom_width: 0.4, ..Grooves::default() };
     let mesh = build(&spec, Vec2::ONE);
-    // Four grooves leave 0.3 of 0.25 for each side.
+    // The distance of the grooves is 0.25, of which the bottom leaves 0.3 for each side.
     assert!(mesh.notes.len() == 1 && mesh.notes[0].contains("69.4 degrees"), "{:?}", mesh.notes);
     assert!(build(&Grooves { side_angle_deg: 69.5, ..spec.clone() }, Vec2::ONE).notes.is_empty());
     let ignored = Grooves { profile: GrooveProfile::Rectangular, ..spec };
