@@ -11,6 +11,7 @@ use super::mirrored::{MOST_IMAGES, MirroredNodes, draw_image};
 use super::sampler::LobeSampler;
 use super::transport::{Ray, Vertex, first_density};
 use super::viewer_weights::ViewerWeights;
+use super::walk::diverges;
 use super::{InterreflectionSettings, InterreflectionTable, Transport};
 use crate::base::{Cancel, Result};
 use crate::brdf::{LobeAngles, Material, Term, analytic_lobe};
@@ -331,7 +332,7 @@ impl<'a> Exchange<'a> {
             }
             *weight /= survival;
         }
-        if direction.dot(at.geometric_normal) <= 0.0 {
+        if diverges(*weight) || direction.dot(at.geometric_normal) <= 0.0 {
             return None;
         }
         let next = self.transport.tracer.trace(at.origin, direction, at.triangle)?;

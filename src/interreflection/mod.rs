@@ -24,7 +24,7 @@ pub use sampler::LobeSampler;
 pub use share::{BouncedShare, measure as measure_share};
 pub use table::InterreflectionTable;
 pub use transport::{MOST_RAYS_PER_USEFUL, Ray, Tracer, Transport, Vertex};
-pub use walk::{WalkPoint, WalkedTile};
+pub use walk::{WalkPoint, WalkedTile, diverges};
 
 use crate::brdf::Brdf;
 use crate::math::directions::ReducedGrid;

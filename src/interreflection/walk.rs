@@ -8,6 +8,10 @@ use super::sampler::LobeSampler;
 use crate::brdf::Material;
 use crate::geometry::{Hit, PeriodicGrid, SurfacePoint, TileMesh};
 
+/// Largest weight of a walk. Only materials that reflect more light than they receive exceed it. Their light between
+/// facets can grow at every reflection without a limit, up to the range of f32.
+const MAX_WEIGHT: f32 = 1e6;
+
 /// A tile with what walks over it need.
 #[derive(Debug, Clone, Copy)]
 pub struct WalkedTile<'a> {
@@ -51,4 +55,9 @@ impl WalkedTile<'_> {
     pub fn first_hit(&self, at: &WalkPoint, direction: Vec3, bottom: f32) -> Option<Hit> {
         self.grid.first_hit(at.surface.origin, direction, at.surface.triangle, bottom)
     }
+}
+
+/// Returns true if a walk ends because its weight exceeds every weight of a surface that conserves energy.
+pub fn diverges(weight: Vec3) -> bool {
+    weight.max_element() > MAX_WEIGHT
 }

@@ -122,3 +122,33 @@ fn rotated_grooves_on_a_long_tile_have_fewer_than_100_000_triangles() {
     assert!(mesh.triangles.len() < 100_000 && mesh.closes_plane, "{}", mesh.triangles.len());
     assert!(mesh.notes.iter().any(|note| note.contains("grooves run at")), "{:?}", mesh.notes);
 }
+
+/// A matte material that reflects 905 times the light that it receives, between rods: its walks grow past the range of
+/// f32.
+#[test]
+fn light_between_facets_that_create_energy_stays_finite() {
+    let text = r#"
+        tile.size = [1, 0.8]
+        material = [{ name = "default", brdf = { kind = "lambertian", albedo = [905, 0.4, 0.6] }, color = 0.9 }]
+        effects.interreflection = "on"
+        quality = { preset = "draft", backend = "cpu", facets = 48, azimuths = 8, rings = 4 }
+        [tile.geometry]
+        kind = "rods"
+        radius = 0.1
+        length = 0.3
+        taper = 0.2
+        lean_deg = 20
+        spread_deg = 10
+        jitter = 0.5
+        count = 4
+    "#;
+    for preset in ["draft", "reference"] {
+        let mut scene = scene::parse(text).unwrap();
+        scene.quality.preset = preset.to_owned();
+        let base_dir = Path::new("").to_owned();
+        let loaded = LoadedScene { scene, base_dir, name: String::new(), painted: Painted::default() };
+        let outcome = Pipeline::new().effective(&loaded).unwrap();
+        assert_eq!(outcome.health().result.unsound_values, 0, "{preset}");
+        assert!(outcome.health().warnings.iter().any(|warning| warning.contains("conserve energy")), "{preset}");
+    }
+}

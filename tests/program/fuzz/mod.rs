@@ -38,7 +38,8 @@ fn fuzz(target: &Target, seed: u64, done: impl Fn(usize) -> bool) -> (usize, usi
         let (duration, save) = (start.elapsed(), || {
             let path = std::env::temp_dir().join(format!("biscale-fuzz-{}-{seed}-{executions}", target.name));
             std::fs::write(&path, &input).unwrap();
-            path.display().to_string()
+            let text = if target.is_text { String::from_utf8_lossy(&input) } else { "".into() };
+            format!("{}\n{text}", path.display())
         });
         match result {
             Err(_) => panic!("{}: a panic; the input is stored as {}", target.name, save()),
