@@ -7,6 +7,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
+use crate::math::linalg::gemm::{add_outer_products, multiply_parallel};
 use crate::scene::{NoiseBasis, NoiseDriver};
 
 /// Samples per cell of the finest octave, and the limits of a grid's side.
@@ -60,53 +61,111 @@ fn perlin(side: usize, cells: usize, mut random: impl Rng) -> Vec<f64> {
     })
 }
 
-/// Sparse convolution noise with Gabor kernels of random orientation and phase (Lagae et al. 2009).
-fn gabor(side: usize, cells: usize, mut random: impl Rng) -> Vec<f64> {
-    /// Position within the cell, wave vector, phase and sign of an impulse.
-    type Impulse = (DVec2, DVec2, f64, f64);
-    let mut impulse = |_| -> Impulse {
-        let at = DVec2::new(random.random(), random.random());
-        let wave = DVec2::from_angle(TAU * random.random::<f64>()) * (TAU * FREQUENCY);
-        (at, wave, TAU * random.random::<f64>(), if random.random::<bool>() { 1.0 } else { -1.0 })
-    };
-    let impulses: Vec<Impulse> = (0..cells * cells * IMPULSES).map(&mut impulse).collect();
-    at_samples(side, cells, |p| {
-        let (cell, f) = (p.floor(), p - p.floor());
-        let mut sum = 0.0;
-        // Two cells away a kernel is below 1 %.
-        for dy in -2..=2_i64 {
-            for dx in -2..=2_i64 {
-                let wrapped = |at: f64, offset: i64| (at as i64 + offset).rem_euclid(cells as i64) as usize;
-                let index = wrapped(cell.y, dy) * cells + wrapped(cell.x, dx);
-                for (at, wave, phase, sign) in &impulses[index * IMPULSES..(index + 1) * IMPULSES] {
-                    let d = f - *at - DVec2::new(dx as f64, dy as f64);
-                    let envelope = (-PI * BANDWIDTH * BANDWIDTH * d.length_squared()).exp();
-                    sum += sign * envelope * (wave.dot(d) + phase).cos();
-                }
-            }
-        }
-        sum
-    })
+/// An impulse of Gabor noise: its position within the cell, the wave vector, the phase and the sign of its kernel.
+#[derive(Debug, Clone, Copy)]
+struct Impulse {
+    at: DVec2,
+    wave: DVec2,
+    phase: f64,
+    sign: f64,
 }
 
-/// White noise convolved with exp(-2 r²/L²), where L is a cell, so that its autocorrelation is exp(-r²/L²).
-fn gaussian(side: usize, cells: usize, mut random: impl Rng) -> Vec<f64> {
-    let length = side as f64 / cells as f64;
-    let reach = ((2.2 * length).ceil() as usize).min(side * 2);
-    let kernel: Vec<f64> =
-        (0..=2 * reach).map(|k| (-2.0 * ((k as f64 - reach as f64) / length).powi(2)).exp()).collect();
-    let mut field: Vec<f64> =
-        (0..side * side).map(|_| crate::color_map::normal::quantile(random.random::<f64>().max(1e-300))).collect();
-    // Along rows, then transposed, twice: both axes.
-    for _ in 0..2 {
-        let convolved = |index: usize| {
-            let (row, column) = (index % side, index / side);
-            let tap = |(k, weight): (usize, &f64)| weight * field[row * side + (column + k + 2 * side - reach) % side];
-            kernel.iter().enumerate().map(tap).sum::<f64>()
-        };
-        field = (0..side * side).into_par_iter().with_min_len(1024).map(convolved).collect();
+/// Cells around that of a sample whose impulses reach it. Two cells away a kernel is below 1 %.
+const NEIGHBORS: [i64; 5] = [-2, -1, 0, 1, 2];
+
+/// The impulses of all cells, [`IMPULSES`] each.
+fn impulses(cells: usize, mut random: impl Rng) -> Vec<Impulse> {
+    let impulse = |_| {
+        let at = DVec2::new(random.random(), random.random());
+        let wave = DVec2::from_angle(TAU * random.random::<f64>()) * (TAU * FREQUENCY);
+        Impulse {
+            at,
+            wave,
+            phase: TAU * random.random::<f64>(),
+            sign: if random.random::<bool>() { 1.0 } else { -1.0 },
+        }
+    };
+    (0..cells * cells * IMPULSES).map(impulse).collect()
+}
+
+/// Sparse convolution noise with Gabor kernels of random orientation and phase (Lagae et al. 2009). A kernel
+/// `e^(-a d²) cos(k·d + φ)` is the real part of a product of functions of the two coordinates, so that the samples of a
+/// cell are a matrix product over the impulses around it.
+fn gabor(side: usize, cells: usize, random: impl Rng) -> Vec<f64> {
+    let impulses = impulses(cells, random);
+    let step = cells as f64 / side as f64;
+    let position = |k: usize| (k as f64 + 0.5) * step;
+    // The first sample in each cell along an axis.
+    let starts: Vec<usize> =
+        (0..=cells).map(|cell| (0..side).position(|k| position(k) >= cell as f64).unwrap_or(side)).collect();
+    let wrapped = |cell: usize, offset: i64| (cell as i64 + offset).rem_euclid(cells as i64) as usize;
+    let of_cell = |cell: usize| {
+        let [cx, cy] = [cell % cells, cell / cells];
+        let [columns, rows] = [cx, cy].map(|cell| starts[cell]..starts[cell + 1]);
+        let (mut along_x, mut along_y) = (Vec::new(), Vec::new());
+        for (dy, dx) in NEIGHBORS.into_iter().flat_map(|dy| NEIGHBORS.map(|dx| (dy, dx))) {
+            let first = (wrapped(cy, dy) * cells + wrapped(cx, dx)) * IMPULSES;
+            for Impulse { at, wave, phase, sign } in &impulses[first..first + IMPULSES] {
+                let d = |first: usize, cell: usize, offset: i64, at: f64| {
+                    position(first) - (cell as i64 + offset) as f64 - at
+                };
+                let [x, y] = [d(columns.start, cx, dx, at.x), d(rows.start, cy, dy, at.y)];
+                push_wave([x, step], columns.len(), wave.x, 0.0, [1.0, 1.0], &mut along_x);
+                push_wave([y, step], rows.len(), wave.y, *phase, [*sign, -sign], &mut along_y);
+            }
+        }
+        let terms = 2 * NEIGHBORS.len().pow(2) * IMPULSES;
+        let mut values = vec![0.0; rows.len() * columns.len()];
+        let sizes = [rows.len(), columns.len()];
+        add_outer_products(terms, sizes, [&along_y, &along_x], sizes, &mut values);
+        (rows.start, columns, values)
+    };
+    let blocks: Vec<_> = (0..cells * cells).into_par_iter().map(of_cell).collect();
+    let mut field = vec![0.0; side * side];
+    for (first, columns, values) in blocks {
+        for (row, values) in values.chunks(columns.len().max(1)).enumerate() {
+            let start = (first + row) * side + columns.start;
+            field[start..start + values.len()].copy_from_slice(values);
+        }
     }
     field
+}
+
+/// Appends `e^(-a d²)` times the cosine of `k d + φ`, then times its sine, both scaled, at evenly spaced distances `d`.
+/// Each follows from the one before.
+fn push_wave([d, step]: [f64; 2], count: usize, k: f64, phase: f64, scales: [f64; 2], out: &mut Vec<f32>) {
+    let a = PI * BANDWIDTH * BANDWIDTH;
+    let (mut wave, turn) = (DVec2::from_angle(k * d + phase), DVec2::from_angle(k * step));
+    let mut envelope = (-a * d * d).exp();
+    let (mut ratio, change) = ((-a * step * (2.0 * d + step)).exp(), (-2.0 * a * step * step).exp());
+    let first = out.len();
+    out.resize(first + 2 * count, 0.0);
+    let (cosines, sines) = out[first..].split_at_mut(count);
+    for (cosine, sine) in cosines.iter_mut().zip(sines) {
+        *cosine = (scales[0] * envelope * wave.x) as f32;
+        *sine = (scales[1] * envelope * wave.y) as f32;
+        wave = turn.rotate(wave);
+        envelope *= ratio;
+        ratio *= change;
+    }
+}
+
+/// White noise convolved with exp(-2 r²/L²), where L is a cell, so that its autocorrelation is exp(-r²/L²). The
+/// convolution along an axis is a product with a circulant matrix.
+fn gaussian(side: usize, cells: usize, mut random: impl Rng) -> Vec<f64> {
+    let length = side as f64 / cells as f64;
+    let reach = ((2.2 * length).ceil() as i64).min(2 * side as i64);
+    let mut first_row = vec![0.0; side];
+    for offset in -reach..=reach {
+        first_row[offset.rem_euclid(side as i64) as usize] += (-2.0 * (offset as f64 / length).powi(2)).exp();
+    }
+    let circulant: Vec<f32> = (0..side * side).map(|k| first_row[(k % side + side - k / side) % side] as f32).collect();
+    let white = |_| crate::color_map::normal::quantile(random.random::<f64>().max(1e-300)) as f32;
+    let field: Vec<f32> = (0..side * side).map(white).collect();
+    let [mut along_x, mut along_both] = [(); 2].map(|()| vec![0.0; side * side]);
+    multiply_parallel(side, side, side, &field, &circulant, &mut along_x);
+    multiply_parallel(side, side, side, &circulant, &along_x, &mut along_both);
+    along_both.into_iter().map(f64::from).collect()
 }
 
 /// The part of the variance of noise that a Gaussian footprint leaves within it, without samples: from the spectrum
@@ -194,6 +253,45 @@ mod tests {
             assert!(across < 3.0 * inside, "{basis:?}: {across} {inside}");
             assert_eq!(values, rasterize(&noise(*basis, 8, 2)).1);
             assert_ne!(values, rasterize(&NoiseDriver { seed: 4, ..noise(*basis, 8, 2) }).1);
+        }
+    }
+
+    #[test]
+    fn gabor_noise_is_the_sum_of_its_kernels() {
+        let (side, cells) = (64, 3);
+        let random = || ChaCha8Rng::seed_from_u64(7);
+        let (values, impulses) = (gabor(side, cells, random()), impulses(cells, random()));
+        for (index, value) in values.iter().enumerate().step_by(97) {
+            let p = (DVec2::new((index % side) as f64, (index / side) as f64) + 0.5) * (cells as f64 / side as f64);
+            let mut sum = 0.0;
+            for (number, Impulse { at, wave, phase, sign }) in impulses.iter().enumerate() {
+                let cell = DVec2::new((number / IMPULSES % cells) as f64, (number / IMPULSES / cells) as f64);
+                // All copies of the impulse that are within two cells of the sample's.
+                for copy in 0..25 {
+                    let tiles = DVec2::new(f64::from(copy % 5 - 2), f64::from(copy / 5 - 2));
+                    let corner = cell + tiles * cells as f64;
+                    if (corner - p.floor()).abs().max_element() <= 2.0 {
+                        let d = p - corner - *at;
+                        let envelope = (-PI * BANDWIDTH * BANDWIDTH * d.length_squared()).exp();
+                        sum += sign * envelope * (wave.dot(d) + phase).cos();
+                    }
+                }
+            }
+            assert!((value - sum).abs() < 1e-4, "{index}: {value} {sum}");
+        }
+    }
+
+    #[test]
+    fn normal_noise_has_the_autocorrelation_of_its_definition() {
+        let (side, cells) = (256, 16);
+        let values = gaussian(side, cells, ChaCha8Rng::seed_from_u64(5));
+        let lag = |columns: usize| -> f64 {
+            (0..side * side).map(|k| values[k] * values[k / side * side + (k + columns) % side]).sum()
+        };
+        for columns in [4, 8, 16, 24] {
+            let expected = (-(columns as f64 * cells as f64 / side as f64).powi(2)).exp();
+            // 16² cells: the standard error of a correlation is about 1/16.
+            assert!((lag(columns) / lag(0) - expected).abs() < 0.12, "{columns}: {} {expected}", lag(columns) / lag(0));
         }
     }
 
