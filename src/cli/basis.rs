@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use crate::brdf::{Brdf, ColorBasis, MeasuredCache, Term, analytic_lobe};
 use crate::effective::{LowRankSettings, RotatedBasis, RotatedLobe};
+use crate::pipeline::refuse_slab;
 use crate::plan::Settings;
 use crate::scene::LoadedScene;
 use anyhow::Result;
@@ -59,7 +60,7 @@ struct Paper {
 }
 
 pub fn run(args: &SceneArgs) -> Result<()> {
-    let (loaded, ()) = args.open(|loaded| super::slab::refuse(loaded, "basis"))?;
+    let (loaded, ()) = args.open(|loaded| Ok(refuse_slab(loaded)?))?;
     let settings = Settings::from_quality(&loaded.scene.quality).low_rank(false);
     // All files are read before the first factorization, which may take minutes.
     let brdfs = brdfs(&loaded)?;

@@ -20,7 +20,6 @@ mod render_path;
 mod render_zoom;
 pub mod report;
 pub mod rig;
-mod slab;
 pub mod tile;
 mod to_image;
 pub mod transmit;

@@ -11,7 +11,6 @@ use super::mirrored::{MOST_IMAGES, MirroredNodes, draw_image};
 use super::sampler::LobeSampler;
 use super::transport::{Ray, Vertex, first_density};
 use super::viewer_weights::ViewerWeights;
-use super::walk::diverges;
 use super::{InterreflectionSettings, InterreflectionTable, Transport};
 use crate::base::{Cancel, Result};
 use crate::brdf::{LobeAngles, Material, Term, analytic_lobe};
@@ -323,7 +322,7 @@ impl<'a> Exchange<'a> {
         let Reflector { material, sampler, .. } = self.materials[at.element as usize];
         let numbers = [rng.random(), rng.random(), rng.random()];
         let (direction, factor) = sampler.sample(&material.brdf, at.normal, towards, numbers)?;
-        *weight *= factor * self.colors[at.element as usize];
+        *weight *= factor * sampler.color_of_walk(self.colors[at.element as usize]);
         let is_hidden = self.openness[at.element as usize] < HIDDEN;
         let survival = weight.max_element() / if is_hidden { MIN_HIDDEN_WEIGHT } else { MIN_WEIGHT };
         if survival < 1.0 {
@@ -332,7 +331,7 @@ impl<'a> Exchange<'a> {
             }
             *weight /= survival;
         }
-        if diverges(*weight) || direction.dot(at.geometric_normal) <= 0.0 {
+        if direction.dot(at.geometric_normal) <= 0.0 {
             return None;
         }
         let next = self.transport.tracer.trace(at.origin, direction, at.triangle)?;

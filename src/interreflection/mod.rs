@@ -24,7 +24,7 @@ pub use sampler::LobeSampler;
 pub use share::{BouncedShare, measure as measure_share};
 pub use table::InterreflectionTable;
 pub use transport::{MOST_RAYS_PER_USEFUL, Ray, Tracer, Transport, Vertex};
-pub use walk::{WalkPoint, WalkedTile, diverges};
+pub use walk::{WalkPoint, WalkedTile};
 
 use crate::brdf::Brdf;
 use crate::math::directions::ReducedGrid;
@@ -45,13 +45,13 @@ pub struct InterreflectionSettings {
     pub mirrors: [bool; 2],
 }
 
-/// The fraction of uniform light that a surface reflects: `∫ albedo(θ) 2 sin θ cos θ dθ`, at most 1. The integral uses
-/// `rings` values of θ, with a quadrature of `samples²` points for each.
+/// The fraction of uniform light that a surface reflects: `∫ albedo(θ) 2 sin θ cos θ dθ`. It exceeds 1 if the BRDF creates
+/// energy. The integral uses `rings` values of θ, with a quadrature of `samples²` points for each.
 pub fn mean_albedo(brdf: &Brdf, rings: usize, samples: usize) -> Vec3 {
     let ring = |k: usize| {
         // Even steps of sin²θ.
         let sine = ((k as f32 + 0.5) / rings as f32).sqrt();
         brdf.directional_albedo(sine.asin(), samples)
     };
-    ((0..rings).map(ring).sum::<Vec3>() / rings as f32).clamp(Vec3::ZERO, Vec3::ONE)
+    (0..rings).map(ring).sum::<Vec3>() / rings as f32
 }

@@ -4,6 +4,7 @@ use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, PI, TAU};
 
 use glam::Vec3;
 
+use super::mean_albedo;
 use crate::brdf::{Brdf, LobeAngles, Term};
 use crate::math::directions::{from_angles, half_vector};
 
@@ -14,6 +15,8 @@ const ROWS: usize = 16;
 const BINS: usize = 64;
 /// Azimuths per bin of the quadrature.
 const AZIMUTHS: usize = 12;
+/// Rings and samples of the mean albedo.
+const MEAN: (usize, usize) = (4, 32);
 /// Smallest probability of a cosine-weighted direction. It bounds the weight where the table has too little.
 const MIN_COSINE_PROBABILITY: f32 = 0.1;
 
@@ -22,6 +25,8 @@ const MIN_COSINE_PROBABILITY: f32 = 0.1;
 #[derive(Debug)]
 pub struct LobeSampler {
     rows: Vec<Row>,
+    /// Colour with which the BRDF reflects all light of a uniform sky; infinite if it is black.
+    brightest: Vec3,
 }
 
 /// Densities for one angle of the fixed direction.
@@ -35,7 +40,15 @@ struct Row {
 
 impl LobeSampler {
     pub fn new(brdf: &Brdf) -> Self {
-        Self { rows: (0..ROWS).map(|row| Row::new(brdf, (row as f32 + 0.5) * FRAC_PI_2 / ROWS as f32)).collect() }
+        let rows = (0..ROWS).map(|row| Row::new(brdf, (row as f32 + 0.5) * FRAC_PI_2 / ROWS as f32)).collect();
+        Self { rows, brightest: mean_albedo(brdf, MEAN.0, MEAN.1).recip() }
+    }
+
+    /// The colour by which a walk is multiplied at a facet of this one. It is smaller where the material would reflect
+    /// more light than it receives: between facets that create energy, walks would grow at every reflection, past the
+    /// range of f32.
+    pub fn color_of_walk(&self, color: Vec3) -> Vec3 {
+        color.min(self.brightest)
     }
 
     /// Draws a direction for the fixed direction `to`. Returns it with `f / (n·to) / density`, a weight whose mean is
@@ -180,6 +193,14 @@ mod tests {
                 assert!((mean - albedo).abs() < 0.012 * albedo, "{brdf:?} at {theta}: {mean} instead of {albedo}");
             }
         }
+    }
+
+    #[test]
+    fn walks_are_not_brightened_by_materials_that_create_energy() {
+        let sampler = LobeSampler::new(&Brdf { terms: vec![Term::Lambertian { albedo: Vec3::new(0.8, 0.5, 0.0) }] });
+        assert_eq!(sampler.color_of_walk(Vec3::new(1.2, 0.7, 1e3)), Vec3::new(1.2, 0.7, 1e3));
+        let reflected = sampler.color_of_walk(Vec3::splat(1e3)) * Vec3::new(0.8, 0.5, 1e-3);
+        assert!((reflected - Vec3::ONE).abs().max_element() < 1e-2, "{reflected}");
     }
 
     #[test]

@@ -8,7 +8,6 @@ use serde::Serialize;
 
 use super::WalkedTile;
 use super::sampler::from_cosine;
-use super::walk::diverges;
 use crate::base::{Cancel, Result};
 
 /// Number of walks. The standard error is some tenths of a small share, and a tenth of a large one.
@@ -77,9 +76,6 @@ fn reflected(tile: &WalkedTile<'_>, bottom: f32, number: usize) -> [f64; 2] {
             break;
         }
         weight /= survival;
-        if diverges(weight) {
-            break;
-        }
         direction = next;
         hit = tile.first_hit(&at, direction, bottom);
         if hit.is_none() && direction.z > 0.0 {

@@ -8,10 +8,6 @@ use super::sampler::LobeSampler;
 use crate::brdf::Material;
 use crate::geometry::{Hit, PeriodicGrid, SurfacePoint, TileMesh};
 
-/// Largest weight of a walk. Only materials that reflect more light than they receive exceed it. Their light between
-/// facets can grow at every reflection without a limit, up to the range of f32.
-const MAX_WEIGHT: f32 = 1e6;
-
 /// A tile with what walks over it need.
 #[derive(Debug, Clone, Copy)]
 pub struct WalkedTile<'a> {
@@ -47,17 +43,14 @@ impl WalkedTile<'_> {
     pub fn reflect(&self, at: &WalkPoint, to: Vec3, random: &mut ChaCha8Rng) -> Option<(Vec3, Vec3)> {
         let numbers = [random.random(), random.random(), random.random()];
         let brdf = &self.materials[at.material].brdf;
-        let (direction, factor) = self.samplers[at.material].sample(brdf, at.surface.normal, to, numbers)?;
-        (direction.dot(at.surface.geometric_normal) > 0.0).then(|| (direction, factor * at.color))
+        let sampler = &self.samplers[at.material];
+        let (direction, factor) = sampler.sample(brdf, at.surface.normal, to, numbers)?;
+        (direction.dot(at.surface.geometric_normal) > 0.0)
+            .then(|| (direction, factor * sampler.color_of_walk(at.color)))
     }
 
     /// The first hit of a ray from a point. `bottom` is the lowest z of the tile.
     pub fn first_hit(&self, at: &WalkPoint, direction: Vec3, bottom: f32) -> Option<Hit> {
         self.grid.first_hit(at.surface.origin, direction, at.surface.triangle, bottom)
     }
-}
-
-/// Returns true if a walk ends because its weight exceeds every weight of a surface that conserves energy.
-pub fn diverges(weight: Vec3) -> bool {
-    weight.max_element() > MAX_WEIGHT
 }

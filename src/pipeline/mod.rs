@@ -44,7 +44,7 @@ use self::outcome::{ExaminedSum, limits};
 use self::refine::RefinedSum;
 pub use self::shading::ShadingBrdf;
 use self::shading::{LastShading, Shading, ShadingKeys};
-pub use self::slab::SlabOutcome;
+pub use self::slab::{SlabOutcome, refuse_slab};
 pub use self::slab_values::{PHOTON_TARGET, SlabValues, require_faces};
 pub use self::stage::{Codec, Keyed, Stage, StageTimes};
 use self::stage::{Memo, elapsed_ms, lock};

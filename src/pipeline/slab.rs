@@ -32,9 +32,11 @@ pub struct SlabOutcome {
     pub svbtdf: Option<Arc<Svbtdf>>,
 }
 
+/// Checks that a scene has no slab, before a command that does not support slabs.
+///
 /// # Errors
-/// The scene has a slab, which the caller does not support.
-pub(super) fn refuse_slab(loaded: &LoadedScene) -> Result<()> {
+/// The scene has a slab.
+pub fn refuse_slab(loaded: &LoadedScene) -> Result<()> {
     if loaded.scene.slab.is_none() {
         return Ok(());
     }

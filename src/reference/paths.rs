@@ -6,7 +6,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::geometry::{Facets, SurfacePoint};
-use crate::interreflection::{WalkPoint, WalkedTile, diverges};
+use crate::interreflection::{WalkPoint, WalkedTile};
 use crate::metrics::Pair;
 
 /// Smallest cosine in a denominator.
@@ -64,7 +64,7 @@ impl<'a> Paths<'a> {
         for _ in 0..self.bounces {
             let Some((from, factor)) = self.tile.reflect(&at, towards, rng) else { break };
             weight *= factor;
-            if weight.max_element() <= 0.0 || diverges(weight) {
+            if weight.max_element() <= 0.0 {
                 break;
             }
             let hit = self.tile.first_hit(&at, from, self.bottom);

@@ -48,7 +48,8 @@ fn shading_brdfs_of_the_papers_five_scenes_reach_28_db_on_pairs_that_their_check
 
 #[test]
 fn images_of_a_weave_that_two_coarser_tables_do_not_serve_read_a_third() {
-    let narrow = "material.default.brdf={ kind = \"ggx\", roughness = 0.09, f0 = 1 }";
+    // The threads have colours up to 6: with 0.16 they conserve energy.
+    let narrow = "material.default.brdf={ kind = \"ggx\", roughness = 0.13, f0 = 0.16 }";
     let loaded = open("table4_skirt", &[narrow, "quality.backend=cpu"]);
     let outcome = Pipeline::new().effective(&loaded).unwrap();
     let read = outcome.shading_brdf(&Cancel::default()).unwrap();
