@@ -89,7 +89,7 @@ fn broadcast(arguments: &[&Argument<'_, '_>]) -> PyResult<Broadcast> {
         for (k, &length) in other.iter().enumerate() {
             let place = &mut wide[offset + k];
             if *place != length && *place != 1 && length != 1 {
-                let found = format!("the shapes {shape:?} and {other:?} (without the last axis)");
+                let found = format!("the shapes {shape:?} and {other:?} of items");
                 let names = format!("{}, {}", first.name, argument.name);
                 return Err(refuse(first.array.py(), &names, found, "shapes that broadcast"));
             }
@@ -164,7 +164,7 @@ pub fn directions_and_uniform(
     check_unit("wi", &directions, &broadcast.shape).or_raise(wi.py())?;
     let outside = |pair: &[f64; 2]| pair.iter().any(|number| !(0.0..=1.0).contains(number));
     if let Some(at) = uniform.iter().position(outside) {
-        let place = format!("u{:?}", index(at, &broadcast.shape));
+        let place = format!("u{}", shown_index(at, &broadcast.shape));
         return Err(refuse(wi.py(), &place, format!("{:?}", uniform[at]), "two numbers from 0 to 1"));
     }
     Ok((directions, uniform, broadcast))
@@ -172,10 +172,16 @@ pub fn directions_and_uniform(
 
 /// Two arrays of numbers, broadcast against each other.
 pub fn numbers(names: [&str; 2], a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> PyResult<(Vec<(f64, f64)>, Broadcast)> {
+    let py = a.py();
     let arguments = [Argument::new(names[0], a, 0)?, Argument::new(names[1], b, 0)?];
     let broadcast = broadcast(&[&arguments[0], &arguments[1]])?;
     let [a, b] = arguments.each_ref().map(|argument| argument.read(&broadcast.shape, 0, |number| number[0]));
-    Ok((a?.into_iter().zip(b?).collect(), broadcast))
+    let numbers: Vec<(f64, f64)> = a?.into_iter().zip(b?).collect();
+    if let Some(at) = numbers.iter().position(|(a, b)| !(a.is_finite() && b.is_finite())) {
+        let place = format!("{}, {}{}", names[0], names[1], shown_index(at, &broadcast.shape));
+        return Err(refuse(py, &place, format!("{:?}", numbers[at]), "finite numbers"));
+    }
+    Ok((numbers, broadcast))
 }
 
 /// Checks that directions have the length 1. The error names the index of the first that has not.
@@ -184,19 +190,22 @@ fn check_unit<D: Direction>(name: &str, directions: &[D], shape: &[usize]) -> Re
     let Some(at) = directions.iter().position(|direction| !range.contains(&direction.length_squared())) else {
         return Ok(());
     };
-    let place = if shape.is_empty() { name.to_owned() } else { format!("{name}{:?}", index(at, shape)) };
+    let place = format!("{name}{}", shown_index(at, shape));
     let found = format!("a vector of length {}", directions[at].length_squared().sqrt());
     Err(InputError::new(place, found, "a unit vector (to 1e-3)").into())
 }
 
-/// The index of an item of an array.
-fn index(mut at: usize, shape: &[usize]) -> Vec<usize> {
+/// The index of an item of an array in brackets; nothing for a single item.
+fn shown_index(mut at: usize, shape: &[usize]) -> String {
+    if shape.is_empty() {
+        return String::new();
+    }
     let mut index = vec![0; shape.len()];
     for (place, &length) in index.iter_mut().zip(shape).rev() {
         *place = at % length.max(1);
         at /= length.max(1);
     }
-    index
+    format!("{index:?}")
 }
 
 impl Broadcast {

@@ -15,19 +15,22 @@ use pyo3::prelude::*;
 mod _core {
     use std::ffi::OsString;
 
-    use biscale::cli;
     use biscale::math::directions::{HemispherePairGrid, angles_of_direction, direction_of_angles};
+    use biscale::{InputError, cli};
     use glam::DVec3;
     use pyo3::prelude::*;
     use pyo3::types::{PyDict, PyTuple};
 
-    use crate::arrays;
     #[pymodule_export]
     use crate::effective::EffectiveBrdf;
     #[pymodule_export]
     use crate::scene::Scene;
     use crate::scene::{shipped_scenes, unpickle};
     use crate::tables::renderer_tables;
+    use crate::{arrays, errors};
+
+    /// Most pairs that a call draws.
+    const MAX_PAIRS: usize = 100_000_000;
 
     /// The version of the package.
     #[pymodule_export]
@@ -55,6 +58,10 @@ mod _core {
     /// fits are measured.
     #[pyfunction]
     fn mirror_biased_pairs(py: Python<'_>, count: usize, seed: u64) -> PyResult<Bound<'_, PyTuple>> {
+        if count > MAX_PAIRS {
+            let expected = format!("a number of pairs up to {MAX_PAIRS}");
+            return Err(errors::input_error(py, &InputError::new("count", count, expected)));
+        }
         let pairs = biscale::metrics::mirror_biased_pairs(count, seed);
         let broadcast = arrays::Broadcast { shape: vec![pairs.len()], single: true };
         let (wi, wo): (Vec<_>, Vec<_>) = pairs.into_iter().map(|pair| (pair.i, pair.o)).unzip();

@@ -53,25 +53,30 @@ fn engine() -> anyhow::Result<Arc<Engine>> {
 #[derive(Default)]
 pub struct Job {
     pub cancel: Cancel,
-    /// Bits of the completed fraction.
-    part: AtomicU32,
+    /// Bits of the completed fraction that the work reported.
+    reported: AtomicU32,
+    /// Bits of the largest fraction that the caller was told. Stages count from 0; the fraction of the call does not fall.
+    told: AtomicU32,
 }
 
 impl Job {
     /// A progress function for the library.
     pub fn progress(&self) -> impl Fn(f32) -> bool + Sync {
         |part| {
-            self.part.store(part.to_bits(), Ordering::Relaxed);
+            self.reported.store(part.to_bits(), Ordering::Relaxed);
             !self.cancel.is_set()
         }
     }
 
     /// The completed fraction.
     fn part(&self) -> f32 {
-        match self.cancel.running() {
+        let part = match self.cancel.running() {
             Some(running) if running.all > 0 => running.done as f32 / running.all as f32,
-            _ => f32::from_bits(self.part.load(Ordering::Relaxed)),
-        }
+            _ => f32::from_bits(self.reported.load(Ordering::Relaxed)),
+        };
+        // The bits of positive numbers are in the order of the numbers.
+        let bits = part.clamp(0.0, 1.0).to_bits();
+        f32::from_bits(self.told.fetch_max(bits, Ordering::Relaxed).max(bits))
     }
 
     /// Raises the exception of a signal, or calls the caller's progress function.

@@ -13,7 +13,7 @@ use biscale::scene::{EditableScene, LoadedScene, SceneBundle, keys_of, shipped};
 use glam::{DVec3, Vec3};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::{PyDict, PyMapping, PyTuple};
 
 use crate::effective::EffectiveBrdf;
 use crate::errors::{self, OrRaise};
@@ -38,7 +38,7 @@ pub struct Options<'py> {
     pub quality: Option<String>,
     pub seed: Option<u64>,
     pub backend: Option<String>,
-    pub effects: Option<Bound<'py, PyDict>>,
+    pub effects: Option<Bound<'py, PyMapping>>,
 }
 
 impl Options<'_> {
@@ -48,15 +48,15 @@ impl Options<'_> {
         texts.extend(self.quality.iter().map(|name| format!("quality.preset={name:?}")));
         texts.extend(self.backend.iter().map(|name| format!("quality.backend={name:?}")));
         texts.extend(self.seed.iter().map(|seed| format!("quality.seed={seed}")));
-        for (name, switch) in self.effects.iter().flatten() {
+        let effects = self.effects.as_ref().map(PyMappingMethods::items).transpose()?;
+        for effect in effects.iter().flatten() {
+            let (name, switch): (Bound<'_, PyAny>, Bound<'_, PyAny>) = effect.extract()?;
             let switch = match switch.extract::<bool>() {
                 Ok(on) => (if on { "on" } else { "off" }).to_owned(),
                 Err(_) => switch.str()?.extract::<String>()?,
             };
-            let text = format!("{}={switch}", name.str()?);
-            texts.push(cli::parse_effect(&text).map_err(|expected| {
-                errors::input_error(py, &InputError::new("effects", format!("`{text}`"), expected))
-            })?);
+            let name: String = name.str()?.extract()?;
+            texts.push(cli::effect_override(&name, &switch).map_err(|error| errors::input_error(py, &error))?);
         }
         Ok(texts)
     }
@@ -73,7 +73,12 @@ impl Scene {
 
     fn loaded(&self, py: Python<'_>, options: &Options<'_>) -> PyResult<LoadedScene> {
         let texts = options.overrides(py)?;
-        self.lock().with_overrides(&texts).or_raise(py)
+        let loaded = self.lock().with_overrides(&texts).or_raise(py)?;
+        if loaded.scene.quality.backend == "gpu" {
+            let found = "`gpu`, which this package was built without (feature `gpu`)";
+            return Err(errors::input_error(py, &InputError::new("quality.backend", found, "`auto` or `cpu`")));
+        }
+        Ok(loaded)
     }
 }
 
@@ -105,6 +110,11 @@ impl Scene {
         value.map(|value| values::from_toml(py, &value)).transpose()
     }
 
+    /// Whether the scene has a key, set or not.
+    fn __contains__(&self, key: &str) -> bool {
+        self.lock().get(key).is_ok()
+    }
+
     /// Sets a key, as `--set` does.
     fn __setitem__(&self, py: Python<'_>, key: String, value: &Bound<'_, PyAny>) -> PyResult<()> {
         let value = values::to_toml(&key, value)?;
@@ -112,9 +122,10 @@ impl Scene {
     }
 
     /// Sets several keys, all of them or none.
-    fn set(&self, py: Python<'_>, edits: &Bound<'_, PyDict>) -> PyResult<()> {
-        let edits = edits.iter().map(|(key, value)| {
-            let key: String = key.extract()?;
+    fn set(&self, py: Python<'_>, edits: &Bound<'_, PyMapping>) -> PyResult<()> {
+        let edits = edits.items()?;
+        let edits = edits.iter().map(|edit| {
+            let (key, value): (String, Bound<'_, PyAny>) = edit.extract()?;
             let value = values::to_toml(&key, &value)?;
             Ok((key, value))
         });
@@ -156,7 +167,7 @@ impl Scene {
 
     /// Computes the effective BRDF, as `biscale eval` does.
     ///
-    /// `quality` is a preset (`draft`, `standard`, `fine`, `wu2011`), `backend` is `auto`, `cpu` or `gpu`, and `effects` forces
+    /// `quality` is a preset (`draft`, `standard`, `fine`, `reference`, `wu2011`), `backend` is `auto` or `cpu`, and `effects` forces
     /// effects of the plan `on` or `off`. `progress` is called with the completed fraction and stops the computation by
     /// returning False. Raises `Cancelled` then.
     #[pyo3(signature = (*, quality = None, seed = None, backend = None, effects = None, progress = None))]
@@ -166,7 +177,7 @@ impl Scene {
         quality: Option<String>,
         seed: Option<u64>,
         backend: Option<String>,
-        effects: Option<Bound<'_, PyDict>>,
+        effects: Option<Bound<'_, PyMapping>>,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<EffectiveBrdf> {
         let loaded = self.loaded(py, &Options { quality, seed, backend, effects })?;
@@ -190,7 +201,7 @@ impl Scene {
         wo: &Bound<'py, PyAny>,
         target: Option<f64>,
         seed: Option<u64>,
-        effects: Option<Bound<'py, PyDict>>,
+        effects: Option<Bound<'py, PyMapping>>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyTuple>> {
         let quality = Some("reference".to_owned());
@@ -210,7 +221,11 @@ impl Scene {
             }
             let single = |(i, o): (DVec3, DVec3)| biscale::metrics::Pair { i: i.as_vec3(), o: o.as_vec3() };
             let pairs: Vec<_> = pairs.into_iter().map(single).collect();
-            let estimates = pipeline.reference(&loaded, &pairs, target, |_, _| !job.cancel.is_set())?;
+            // The squared error falls in proportion to the rays.
+            let goal = target.unwrap_or(f64::from(loaded.scene.quality.reference_target));
+            let progress = job.progress();
+            let part = |_, error: f64| progress((goal / error.max(goal)).powi(2) as f32);
+            let estimates = pipeline.reference(&loaded, &pairs, target, part)?;
             Ok(estimates
                 .iter()
                 .map(|estimate| (estimate.f_bar, estimate.standard_error))
@@ -235,7 +250,7 @@ impl Scene {
         quality: Option<String>,
         seed: Option<u64>,
         backend: Option<String>,
-        effects: Option<Bound<'py, PyDict>>,
+        effects: Option<Bound<'py, PyMapping>>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let loaded = self.loaded(py, &Options { quality, seed, backend, effects })?;

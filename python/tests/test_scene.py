@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -63,6 +64,10 @@ def test_all_shipped_scenes_open():
         (lambda scene: scene.set({"tile.geometry.depth": object()}), "tile.geometry.depth", None),
         (lambda scene: scene.effective(quality="best"), "quality.preset", None),
         (lambda scene: scene.effective(effects={"nothing": "on"}), "effects", None),
+        (lambda scene: scene.effective(effects={"interreflection": "of"}), "effects", None),
+        (lambda scene: scene.effective(backend="gpu"), "quality.backend", None),
+        (lambda scene: bs.mirror_biased_pairs(2**62, 1), "count", None),
+        (lambda scene: bs.from_angles([0.1, np.nan], 0.0), "theta, phi[1]", None),
         (lambda scene: scene.reference(WI, WO, target=2.0), "target", None),
     ],
 )
@@ -78,6 +83,21 @@ def test_bad_input_names_the_field_what_was_found_and_what_was_expected(act, fie
     assert scene.to_toml() == before
     again = pickle.loads(pickle.dumps(error))
     assert (str(again), again.field, again.hint) == (str(error), error.field, error.hint)
+
+
+def test_edits_and_effects_are_any_mapping_and_keys_are_in_a_scene():
+    scene = bs.Scene("fig4b_bicolor_cup")
+    scene.set(MappingProxyType({"tile.geometry.depth": 0.3}))
+    assert scene["tile.geometry.depth"] == 0.3
+    scene.effective(quality="draft", effects=MappingProxyType({"interreflection": "off"}))
+    assert "quality.facets" in scene and scene["quality.facets"] is None and "quality.facet" not in scene
+
+
+def test_progress_does_not_fall():
+    scene, parts = bs.Scene("fig4b_bicolor_cup"), []
+    wi, wo = bs.mirror_biased_pairs(400, 1)
+    scene.reference(wi, wo, target=5e-3, progress=parts.append)
+    assert parts == sorted(parts) and max(parts) > 0.0, parts
 
 
 def test_a_bad_file_is_named(tmp_path):

@@ -278,13 +278,25 @@ pub fn parse_minutes(text: &str) -> std::result::Result<f64, String> {
     minutes.ok_or_else(|| format!("found `{text}`, expected minutes from 0 to 10000"))
 }
 
-/// Parses `NAME=on|off|auto` and returns it as an override. The effect `low_rank` becomes the setting `quality.method`.
+/// Parses `NAME=on|off|auto` and returns it as an override.
 pub fn parse_effect(text: &str) -> std::result::Result<String, String> {
-    let invalid = || format!("found `{text}`, expected NAME=on, NAME=off or NAME=auto");
-    let (name, value) = text.split_once('=').ok_or_else(invalid)?;
-    let (name, value) = (name.trim(), value.trim());
+    let (name, value) = text.split_once('=').unwrap_or((text, ""));
+    effect_override(name.trim(), value.trim()).map_err(|error| {
+        if value.is_empty() {
+            return format!("found `{text}`, expected NAME=on, NAME=off or NAME=auto");
+        }
+        format!("found {}, expected {}", error.found, error.expected)
+    })
+}
+
+/// The override that switches an effect `on`, `off` or to `auto`. The effect `low_rank` becomes the setting `quality.method`.
+///
+/// # Errors
+/// An unknown effect or value.
+pub fn effect_override(name: &str, value: &str) -> std::result::Result<String, InputError> {
     if !Switch::NAMES.contains(&value) {
-        return Err(invalid());
+        let found = format!("`{value}` for `{name}`");
+        return Err(InputError::new("effects", found, format!("one of {}", Switch::NAMES.join(", "))));
     }
     let known: Vec<&str> = Effects::fields().iter().map(|field| field.key).filter(|key| *key != "bounces").collect();
     match name {
@@ -297,7 +309,10 @@ pub fn parse_effect(text: &str) -> std::result::Result<String, String> {
             Ok(format!("quality.method={method}"))
         }
         name if known.contains(&name) => Ok(format!("effects.{name}={value}")),
-        name => Err(format!("found the effect `{name}`, expected one of low_rank, {}", known.join(", "))),
+        name => {
+            let expected = format!("one of low_rank, {}", known.join(", "));
+            Err(InputError::new("effects", format!("the effect `{name}`"), expected))
+        }
     }
 }
 
