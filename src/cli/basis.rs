@@ -60,7 +60,7 @@ struct Paper {
 }
 
 pub fn run(args: &SceneArgs) -> Result<()> {
-    let (loaded, ()) = args.open(|loaded| Ok(refuse_slab(loaded)?))?;
+    let (loaded, ()) = args.open(|loaded| Ok(refuse_slab(loaded, "`biscale basis`")?))?;
     let settings = Settings::from_quality(&loaded.scene.quality).low_rank(false);
     // All files are read before the first factorization, which may take minutes.
     let brdfs = brdfs(&loaded)?;

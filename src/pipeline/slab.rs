@@ -32,15 +32,17 @@ pub struct SlabOutcome {
     pub svbtdf: Option<Arc<Svbtdf>>,
 }
 
-/// Checks that a scene has no slab, before a command that does not support slabs.
+/// Checks that a scene has no slab, before a `command` that does not support slabs.
 ///
 /// # Errors
 /// The scene has a slab.
-pub fn refuse_slab(loaded: &LoadedScene) -> Result<()> {
+pub fn refuse_slab(loaded: &LoadedScene, command: &str) -> Result<()> {
     if loaded.scene.slab.is_none() {
         return Ok(());
     }
-    let expected = "a scene without it; `biscale eval`, `transmit`, `render`, `export`, `fit`, `rig`, `plan` and `profile` know slabs";
+    let expected = format!(
+        "a scene without it: {command} knows no slabs; `eval`, `transmit`, `render`, `export`, `fit`, `rig`, `plan` and `profile` do"
+    );
     Err(InputError::new("slab", "a scene with a slab", expected).in_file(&loaded.name).into())
 }
 
