@@ -178,8 +178,7 @@ fn model(slab: &Slab, i: DVec3) -> Transmitted {
     let [straight, mirrored] = slab.straight(i);
     let left = DVec3::ONE - slab.optics.diffuse;
     let part = |of: &dyn Fn(&crate::slab::Parts) -> f64| -> Option<DVec3> {
-        let inner = slab.inner.as_ref()?;
-        let parts = DVec3::from_array([0, 1, 2].map(|k| of(&inner.parts(i, k))));
+        let parts = DVec3::from_array(slab.parts(i)?.map(|parts| of(&parts)));
         Some(left * DVec3::select(slab.optics.eta.cmpne(DVec3::ONE), parts, DVec3::ZERO))
     };
     let clear = DVec3::select(slab.optics.eta.cmpeq(DVec3::ONE), left - straight, DVec3::ZERO);

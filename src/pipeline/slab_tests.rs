@@ -69,8 +69,8 @@ fn shipped_slabs_are_computed_and_keep_all_light() {
         // Paper absorbs.
         let least = if slab.captured.is_some() { 0.3 } else { 0.5 };
         assert!(transmitted.min_element() > least && all.max_element() < 1.03, "{name}: {transmitted} {all}");
-        if slab.inner.is_some() {
-            let absorbed = DVec3::from_array([0, 1, 2].map(|k| slab.inner.as_ref().unwrap().parts(i, k).absorbed));
+        if let Some(parts) = slab.parts(i) {
+            let absorbed = DVec3::from_array(parts.map(|parts| parts.absorbed));
             // Eq. 11 loses light.
             let bound = if slab.method == Method::Faces || slab.top.is_smooth() { 0.03 } else { 0.1 };
             assert!((all + absorbed - 1.0).abs().max_element() < bound, "{name}: {all} + {absorbed}");
@@ -96,7 +96,7 @@ fn equal_rough_faces_are_summed_at_standard_quality_and_one_rough_face_is_closed
 }
 
 #[test]
-fn all_mass_of_a_slab_with_bounces_is_reflected_transmitted_or_absorbed_at_every_angle() {
+fn all_light_on_a_rough_slab_with_bounces_is_reflected_transmitted_or_absorbed_up_to_75_degrees() {
     for source in
         [SCENE.to_owned(), SCENE.replace("[slab.top]", "[slab]\nthickness = 1\nabsorption = [0.5, 0.1, 0]\n[slab.top]")]
     {
@@ -111,12 +111,45 @@ fn all_mass_of_a_slab_with_bounces_is_reflected_transmitted_or_absorbed_at_every
                 let [straight, mirrored] = slab.straight(i);
                 let through = DiscLobe::transmitted(slab, i, 96).total() + straight;
                 let back = DiscLobe::reflected(slab, i, 96).total() + mirrored;
-                let absorbed = DVec3::from_array([0, 1, 2].map(|k| slab.inner.as_ref().unwrap().parts(i, k).absorbed));
+                let absorbed = DVec3::from_array(slab.parts(i).unwrap().map(|parts| parts.absorbed));
                 all += (through + back + absorbed) / 2.0;
                 println!("{degrees}, {azimuth}: T {:.4} R {:.4} A {:.4}", through.x, back.x, absorbed.x);
             }
             println!("{degrees}: sum {all:.4}");
             assert!((all - 1.0).abs().max_element() < 0.02, "{degrees}: {all}");
         }
+    }
+}
+
+#[test]
+fn all_light_on_a_pane_is_reflected_transmitted_or_absorbed_at_every_angle() {
+    let slab = Pipeline::new().slab(&scene::open("slab_window", &[]).unwrap()).unwrap().slab;
+    for degrees in [0.0, 60.0, 85.0, 88.0, 89.0, 89.9, 90.0_f64] {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let i = DVec3::new(sin, 0.0, cos);
+        let [through, mirrored] = slab.straight(i);
+        let parts = slab.parts(i).unwrap();
+        let absorbed = DVec3::from_array(parts.map(|parts| parts.absorbed));
+        let after_bounces = DVec3::from_array(parts.map(|parts| parts.after_bounces));
+        assert!((through + mirrored + absorbed - 1.0).abs().max_element() < 1e-12, "{degrees}: {absorbed}");
+        assert!(absorbed.min_element() > -1e-12 && after_bounces.cmple(through).all(), "{degrees}: {after_bounces}");
+    }
+}
+
+#[test]
+fn light_on_a_smooth_top_over_a_rough_bottom_is_reflected_transmitted_or_absorbed_at_grazing_angles() {
+    let source = SCENE
+        .replace("[slab.top]\nkind = \"tile\"", "[slab.top]\nkind = \"smooth\"")
+        .replace("kind = \"ggx\"\nroughness = 0.2", "kind = \"beckmann\"\nroughness = 0.1");
+    let slab = Pipeline::new().slab(&loaded(&source.replace("draft", "standard"))).unwrap().slab;
+    for degrees in [60.0, 86.0, 88.0, 89.0, 89.5, 89.9_f64] {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let i = DVec3::new(sin, 0.0, cos);
+        let [straight, mirrored] = slab.straight(i);
+        let through = DiscLobe::transmitted(&slab, i, 96).total() + straight;
+        let back = DiscLobe::reflected(&slab, i, 96).total() + mirrored;
+        let absorbed = slab.parts(i).unwrap()[0].absorbed;
+        println!("{degrees}: T {:.4} R {:.4} A {absorbed:.4}", through.x, back.x);
+        assert!((through.x + back.x + absorbed - 1.0).abs() < 0.02, "{degrees}: {} {} {absorbed}", through.x, back.x);
     }
 }

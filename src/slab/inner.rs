@@ -8,6 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::even_numbers::EvenNumbers;
+use super::fresnel::reflectance;
 use super::ndf::Ndf;
 use super::optics::{Channel, Optics};
 use super::ring_table::{
@@ -29,6 +30,11 @@ struct ChannelTable {
     parts: Vec<RingParts>,
     /// Mean of the masked part over all directions of the light, by projected solid angle.
     mean_masked: f64,
+    eta: f64,
+    /// Whether the top and the bottom are smooth.
+    is_smooth: [bool; 2],
+    /// Part of the light of each ring that passes a smooth face.
+    passing: [f64; RINGS],
 }
 
 /// Parts of the incident light that do not pass at once.
@@ -162,7 +168,8 @@ impl Inner {
     pub fn btdf(&self, i: DVec3, o: DVec3) -> DVec3 {
         self.per_channel(|table| {
             let scale = table.relative(i, |parts| &parts.transmitted);
-            scale * table.transmitted.read(i, o) + 0.5 * table.part(i, |parts| &parts.masked) / PI
+            let taps = [(i, table.is_smooth[0]), (o, table.is_smooth[1])].map(|(w, smooth)| table.taps(w, smooth));
+            scale * table.transmitted.read_at(i, o, taps[0], taps[1]) + 0.5 * table.part(i, |parts| &parts.masked) / PI
         })
     }
 
@@ -173,7 +180,8 @@ impl Inner {
             // The product is reciprocal, and its integral over the viewers is half of the masked part.
             let part = if table.mean_masked > 0.0 { masked(i) * masked(o) / table.mean_masked } else { 0.0 };
             let scale = |w: DVec3| table.relative(w, |parts| &parts.reflected);
-            scale(i) * scale(o) * table.reflected.read(i, o) + 0.5 * part / PI
+            let taps = [i, o].map(|w| table.taps(w, table.is_smooth[0]));
+            scale(i) * scale(o) * table.reflected.read_at(i, o, taps[0], taps[1]) + 0.5 * part / PI
         })
     }
 
@@ -233,20 +241,44 @@ impl ChannelTable {
         drop_noise(&mut parts);
         let mean_masked = (0..RINGS).map(|ring| projected_solid_angle(ring) / PI * parts[ring].masked.mean()).sum();
         let transmitted = RingTable::new(transmitted.iter().map(|value| *value as f32).collect());
-        Self { transmitted, reflected: RingTable::new(reflected), parts, mean_masked }
+        let (eta, is_smooth) = (walk.channel.eta, [walk.top.is_smooth(), walk.bottom.is_smooth()]);
+        let passing = std::array::from_fn(|ring| mean_passing(ring, eta));
+        Self { transmitted, reflected: RingTable::new(reflected), parts, mean_masked, eta, is_smooth, passing }
+    }
+
+    /// The rings around a direction, with weights, for light that passes a face. What passes a smooth face is interpolated as a
+    /// part of the Fresnel transmission, which falls to 0 within the last ring.
+    fn taps(&self, w: DVec3, is_smooth: bool) -> [(usize, f64); 2] {
+        if !is_smooth {
+            return ring_taps(w);
+        }
+        let passing = 1.0 - reflectance(w.z.abs(), self.eta);
+        ring_taps(w).map(|(ring, weight)| {
+            let of_ring = self.passing[ring];
+            (ring, if of_ring > 0.0 { weight * passing / of_ring } else { 0.0 })
+        })
     }
 
     /// A part of light from `i`, interpolated between the rings.
     fn part(&self, i: DVec3, of: impl Fn(&RingParts) -> &Harmonics) -> f64 {
         let basis = Harmonics::basis(i);
-        ring_taps(i).iter().map(|(ring, weight)| weight * of(&self.parts[*ring]).at(&basis)).sum()
+        self.taps(i, self.is_smooth[0]).iter().map(|(ring, weight)| weight * of(&self.parts[*ring]).at(&basis)).sum()
     }
 
     /// A part of light from `i` over its mean of all azimuths.
     fn relative(&self, i: DVec3, of: impl Fn(&RingParts) -> &Harmonics) -> f64 {
-        let mean: f64 = ring_taps(i).iter().map(|(ring, weight)| weight * of(&self.parts[*ring]).mean()).sum();
+        let taps = self.taps(i, self.is_smooth[0]);
+        let mean: f64 = taps.iter().map(|(ring, weight)| weight * of(&self.parts[*ring]).mean()).sum();
         if mean > 0.0 { self.part(i, of) / mean } else { 1.0 }
     }
+}
+
+/// Part of the light of a ring that passes a smooth face, by projected solid angle.
+fn mean_passing(ring: usize, eta: f64) -> f64 {
+    const STEPS: usize = 64;
+    let (low, high) = (edge(ring), edge(ring + 1));
+    let square = |step: usize| low + (high - low) * (step as f64 + 0.5) / STEPS as f64;
+    (0..STEPS).map(|step| 1.0 - reflectance((1.0 - square(step)).max(0.0).sqrt(), eta)).sum::<f64>() / STEPS as f64
 }
 
 /// Part of the photons that the innermost ring gets; the share grows evenly to 1 of the outermost.

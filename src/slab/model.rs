@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 use super::capture::svbtdf::MeanBtdf;
 use super::faces::FaceSum;
 use super::fresnel::reflectance;
-use super::inner::Inner;
+use super::inner::{Inner, Parts};
 use super::ndf::Ndf;
 use super::optics::{Channel, Optics};
 use super::rows::SlabRow;
@@ -164,6 +164,24 @@ impl Slab {
         let transmitted = self.optics.per_channel(|channel| parts(channel).transmitted);
         let reflected = self.optics.per_channel(|channel| parts(channel).reflected);
         [left * transmitted, left * reflected]
+    }
+
+    /// Parts of light from `i`, which points up, that do not pass at once, per channel; `None` without bounces.
+    pub fn parts(&self, i: DVec3) -> Option<[Parts; 3]> {
+        let inner = self.inner.as_ref()?;
+        Some([0, 1, 2].map(|k| {
+            if !(self.top.is_smooth() && self.bottom.is_smooth()) {
+                return inner.parts(i, k);
+            }
+            // All light between level faces is straight, and the rest is absorbed.
+            let of = |bounces| straight(&self.top, &self.bottom, i, self.optics.channel(k), bounces);
+            let (all, once) = (of(true), of(false));
+            Parts {
+                absorbed: 1.0 - all.transmitted - all.reflected,
+                after_bounces: all.transmitted - once.transmitted,
+                ..Parts::default()
+            }
+        }))
     }
 
     /// Root mean square difference of the slopes of both faces.

@@ -37,7 +37,11 @@ impl RingTable {
     /// The value at a pair of directions, linear in both polar angles and in the azimuth between the directions of travel of
     /// straight light.
     pub fn read(&self, i: DVec3, o: DVec3) -> f64 {
-        let (a, b) = (ring_taps(i), ring_taps(o));
+        self.read_at(i, o, ring_taps(i), ring_taps(o))
+    }
+
+    /// The value at a pair of directions whose rings have these weights.
+    pub(super) fn read_at(&self, i: DVec3, o: DVec3, a: [(usize, f64); 2], b: [(usize, f64); 2]) -> f64 {
         let turn = turn(i, o) / PI * TURNS as f64 - 0.5;
         let (low, t) = (turn.floor(), turn - turn.floor());
         let turns = [low.max(0.0) as usize, (low + 1.0).min((TURNS - 1) as f64) as usize];

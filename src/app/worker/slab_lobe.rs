@@ -177,10 +177,8 @@ fn parts(slab: &Slab, transmitted: &DiscLobe, i: DVec3) -> [(&'static str, f32);
     let grey = |value: DVec3| (value.element_sum() / 3.0) as f32;
     let [straight, mirrored] = slab.straight(i).map(grey);
     let left = DVec3::select(slab.optics.eta.cmpne(DVec3::ONE), DVec3::ONE - slab.optics.diffuse, DVec3::ZERO);
-    let bounced = slab.inner.as_ref().map_or(0.0, |inner| {
-        let after = |channel: usize| inner.parts(i, channel).after_bounces;
-        grey(left * DVec3::from_array([0, 1, 2].map(after)))
-    });
+    let bounced =
+        slab.parts(i).map_or(0.0, |parts| grey(left * DVec3::from_array(parts.map(|parts| parts.after_bounces))));
     // Light that bounces between level facets is straight.
     let total = grey(transmitted.total());
     let bounced = bounced.min(total);
