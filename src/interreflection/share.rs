@@ -69,7 +69,8 @@ fn reflected(tile: &WalkedTile<'_>, bottom: f32, number: usize) -> [f64; 2] {
     for facet in 0..MAX_FACETS {
         let Some(at) = hit.and_then(|hit| tile.point(&hit, direction)) else { break };
         let Some((next, factor)) = tile.reflect(&at, -direction, &mut random) else { break };
-        weight *= factor;
+        let leaving = weight * factor * at.color;
+        weight = if facet == 0 { leaving } else { weight * factor * tile.color_between(&at) };
         let mean = weight.element_sum() / 3.0;
         let survival = (mean / MIN_WEIGHT).min(1.0);
         if random.random::<f32>() >= survival {
@@ -79,7 +80,7 @@ fn reflected(tile: &WalkedTile<'_>, bottom: f32, number: usize) -> [f64; 2] {
         direction = next;
         hit = tile.first_hit(&at, direction, bottom);
         if hit.is_none() && direction.z > 0.0 {
-            let left = f64::from(mean / survival);
+            let left = f64::from(leaving.element_sum() / 3.0 / survival);
             return if facet == 0 { [left, 0.0] } else { [0.0, left] };
         }
     }

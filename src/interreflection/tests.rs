@@ -106,11 +106,16 @@ fn walks_agree_with_path_tracing_for_diffuse_and_glossy_facets() {
     let pairs = mirror_biased_pairs(48, 9);
     let colored = r#"{ kind = "lambertian", albedo = [0.9, 0.5, 0.2] }"#;
     let glossy = r#"{ kind = "cook_torrance", roughness = 0.4, f0 = [0.9, 0.6, 0.3] }"#;
+    let gaining = r#"{ kind = "lambertian", albedo = 1.5 }"#;
     // Four normals give kinks between the table's nodes, the hardest case for the table.
     let pyramids = r#"{ kind = "pyramids", height = 0.5 }"#;
-    for (geometry, brdf, bounces, bound) in
-        [(DEEP, colored, 3, 0.05), (DEEP, glossy, 1, 0.05), (pyramids, colored, 1, 0.13)]
-    {
+    for (geometry, brdf, bounces, bound) in [
+        (DEEP, colored, 3, 0.05),
+        (DEEP, glossy, 1, 0.05),
+        (pyramids, colored, 1, 0.13),
+        (DEEP, gaining, 1, 0.05),
+        (DEEP, gaining, 3, 0.05),
+    ] {
         let scene = open(geometry, brdf, &format!("interreflection = \"on\"\nbounces = {bounces}"));
         let plain = effective(geometry, brdf, "interreflection = \"off\"");
         let outcome = Pipeline::new().effective(&scene).unwrap();
@@ -300,7 +305,7 @@ fn mirror_planes_save_work_and_change_little() {
         [(DEEP, WHITE, [true; 2], 0.02), (DEEP, glossy, [true; 2], 0.08), (ridges, glossy, [false, true], 0.08)]
     {
         let mirrored = Pipeline::new().effective(&open(geometry, brdf, settings)).unwrap();
-        assert_eq!(mirrored.plan.mirrors, planes);
+        assert_eq!(mirrored.plan.interreflection.unwrap().mirrors, planes);
         let all = effective(geometry, brdf, &format!("{settings}\nmirror_symmetry = \"off\""));
         let direct = effective(geometry, brdf, "interreflection = \"off\"");
         let (mut error, mut norm) = (0.0, 0.0);

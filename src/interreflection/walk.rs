@@ -38,15 +38,20 @@ impl WalkedTile<'_> {
         faces.then(|| WalkPoint { surface, material, color: self.materials[material].color * color() })
     }
 
-    /// Draws a direction by the BRDF for light that leaves along `to`, and what the walk's weight is multiplied by.
-    /// `None` if the walk ends.
+    /// Draws a direction by the BRDF for light that leaves along `to`, and what the walk's weight is multiplied by, without the
+    /// colour. `None` if the walk ends.
     pub fn reflect(&self, at: &WalkPoint, to: Vec3, random: &mut ChaCha8Rng) -> Option<(Vec3, Vec3)> {
         let numbers = [random.random(), random.random(), random.random()];
         let brdf = &self.materials[at.material].brdf;
         let sampler = &self.samplers[at.material];
         let (direction, factor) = sampler.sample(brdf, at.surface.normal, to, numbers)?;
-        (direction.dot(at.surface.geometric_normal) > 0.0)
-            .then(|| (direction, factor * sampler.color_of_walk(at.color)))
+        (direction.dot(at.surface.geometric_normal) > 0.0).then_some((direction, factor))
+    }
+
+    /// The colour with which a point reflects from facet to facet. At its first and its last facet, light has the point's own
+    /// colour.
+    pub fn color_between(&self, at: &WalkPoint) -> Vec3 {
+        self.samplers[at.material].color_of_walk(at.color)
     }
 
     /// The first hit of a ray from a point. `bottom` is the lowest z of the tile.

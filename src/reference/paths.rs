@@ -61,9 +61,9 @@ impl<'a> Paths<'a> {
     /// Radiance towards the viewer due to light that other facets reflected first.
     fn walk(&self, mut at: WalkPoint, pair: Pair, rng: &mut ChaCha8Rng) -> Vec3 {
         let (mut towards, mut weight, mut radiance) = (pair.o, Vec3::ONE, Vec3::ZERO);
-        for _ in 0..self.bounces {
+        for bounce in 0..self.bounces {
             let Some((from, factor)) = self.tile.reflect(&at, towards, rng) else { break };
-            weight *= factor;
+            weight *= factor * if bounce == 0 { at.color } else { self.tile.color_between(&at) };
             if weight.max_element() <= 0.0 {
                 break;
             }
