@@ -38,7 +38,7 @@ pub fn bounced_share(part: Option<&str>, print: &mut dyn FnMut(String)) -> Resul
         }
         let [off, on] = [Switch::Off, Switch::On].map(|switch| at(&loaded, switch));
         let (off, on) = (outcome(&off)?, outcome(&on)?);
-        let Some(told) = off.plan.bounced else {
+        let Some(told) = off.plan.effects.iter().find_map(|effect| effect.light) else {
             print(format!("| `{name}` | not measured | {:.1} % | off | | | |", 100.0 * share(&off, &on)));
             continue;
         };

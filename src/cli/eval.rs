@@ -164,12 +164,15 @@ fn of_outcome(args: &EvalArgs, pipeline: &mut Pipeline, loaded: &LoadedScene, ro
     args.scene.notes(&outcome);
     let pairs: Vec<Pair> = rows.iter().map(Row::pair).collect();
     let values = outcome.brdf.eval_pairs(&pairs, &watch.cancel())?;
+    let estimator = if args.standard_error || args.scene.json { outcome.errors_unless(&watch.cancel())? } else { None };
+    let errors = match estimator.filter(|_| args.standard_error) {
+        Some(estimator) => estimator.standard_errors(&pairs, &watch.cancel())?,
+        None => Vec::new(),
+    };
     drop(watch);
-    let estimator = if args.standard_error || args.scene.json { outcome.errors() } else { None };
-    let errors = estimator.filter(|_| args.standard_error).map(|estimator| estimator.standard_errors(&pairs));
     Ok(Evaluation {
         values,
-        errors: errors.unwrap_or_default(),
+        errors,
         representation: outcome.brdf.representation.describe(),
         error: estimator.map(ErrorEstimator::estimate),
         health: outcome.health().clone(),

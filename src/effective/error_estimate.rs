@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{Direct, FacetSum};
+use crate::base::{Cancel, Result};
 use crate::brdf::Material;
 use crate::geometry::{Facets, REPLICATES};
 use crate::interreflection::InterreflectionTable;
@@ -21,7 +22,9 @@ use crate::metrics::{Pair, mirror_biased_pairs};
 use crate::visibility::Resolution;
 
 /// Numbers of direction pairs that an estimate for a whole BRDF examines.
-pub(super) const PAIRS: PairCount = PairCount { min: 200, min_effective: 16.0 };
+pub(crate) const PAIRS: PairCount = PairCount { min: 200, min_effective: 16.0, max_for_errors: 800 };
+/// Those of an estimate on which refinement decides, which is quick.
+pub(crate) const FEW_PAIRS: PairCount = PairCount { max_for_errors: 0, ..PAIRS };
 /// Most pairs of an estimate.
 const MAX_PAIRS: usize = 6400;
 /// Seed of these pairs.
@@ -89,6 +92,9 @@ pub struct ErrorEstimate {
     pub table: f64,
     /// Relative L2 of the error of the light that facets send to each other, if it is in the result.
     pub interreflection: f64,
+    /// The part of the reflected light that facets send to each other and that the result lacks, which is not in the errors
+    /// above; absent if it was not measured.
+    pub light_left_out: Option<f64>,
     /// The part of `visibility` that is due to the number of azimuths.
     #[serde(skip)]
     pub azimuths: f64,
@@ -185,28 +191,49 @@ pub(super) fn f_bar_at(direct: &Direct, resolution: Resolution, Pair { i, o }: P
     if area > 0.0 { direct.sum.sum(i, o, &v_i, &v_o) / area } else { DVec3::ZERO }
 }
 
+/// Errors of visibility above this relative L2 are examined at more pairs until their effective number is this large: few grazing
+/// pairs may hold most of the error of a surface.
+const LEAST_ERROR: f64 = 0.01;
+const MIN_EFFECTIVE_ERRORS: f64 = 16.0;
+
+/// The sum of squares and the effective number of values, `(Σ|x|²)² / Σ|x|⁴`.
+fn spread(values: impl Iterator<Item = DVec3>) -> (f64, f64) {
+    let (mut norm, mut squares) = (0.0, 0.0);
+    for value in values.map(DVec3::length_squared) {
+        norm += value;
+        squares += value * value;
+    }
+    (norm, if squares > 0.0 { norm * norm / squares } else { 0.0 })
+}
+
 /// Number of direction pairs of an estimate. It is doubled while few pairs hold most of the sum of squares, such as those
 /// that see the bottom of deep grooves.
-pub(super) struct PairCount {
+pub(crate) struct PairCount {
     pub min: usize,
-    /// Smallest effective number of pairs, `(Σ|f̄|²)² / Σ|f̄|⁴`.
+    /// Smallest effective number of the values of `f̄`.
     pub min_effective: f64,
+    /// Most pairs that are examined because few hold most of the error.
+    pub max_for_errors: usize,
 }
 
 impl PairCount {
-    /// Evaluates `of` at enough pairs. `f_bar` returns `f̄` of an evaluation.
-    pub fn evaluate<T: Send>(&self, of: impl Fn(Pair) -> T + Sync, f_bar: impl Fn(&T) -> DVec3) -> Vec<T> {
+    /// Evaluates `of` at enough pairs. `f_bar` and `error` return `f̄` of an evaluation and its error.
+    pub fn evaluate<T: Send>(
+        &self,
+        of: impl Fn(Pair) -> T + Sync,
+        f_bar: impl Fn(&T) -> DVec3,
+        error: impl Fn(&T) -> DVec3,
+    ) -> Vec<T> {
         let mut all: Vec<T> = Vec::new();
         let mut count = self.min;
         loop {
             let pairs = mirror_biased_pairs(count, PAIRS_SEED);
             all.par_extend(pairs[all.len()..].par_iter().map(|&pair| of(pair)));
-            let (mut norm, mut squares) = (0.0, 0.0);
-            for value in all.iter().map(|at| f_bar(at).length_squared()) {
-                norm += value;
-                squares += value * value;
-            }
-            if norm * norm >= self.min_effective * squares && norm > 0.0 || count >= MAX_PAIRS {
+            let (norm, effective) = spread(all.iter().map(&f_bar));
+            let (squared_error, effective_errors) = spread(all.iter().map(&error));
+            let is_small = squared_error <= LEAST_ERROR * LEAST_ERROR * norm;
+            let is_known = is_small || effective_errors >= MIN_EFFECTIVE_ERRORS || count >= self.max_for_errors;
+            if is_known && effective >= self.min_effective || count >= MAX_PAIRS {
                 return all;
             }
             count *= 2;
@@ -247,14 +274,16 @@ impl ErrorEstimator {
     /// Examines a direct sum over `facets`. `second` is the sum over a second sample of the surface, with
     /// [`SECOND_SAMPLE_DIVISOR`] times fewer facets. Without it, facets count as random samples: their error then is too large,
     /// by up to a factor of 6, on surfaces of few large triangles. `table` is the relative L2 of factors that stand for the
-    /// sum, or 0. `bounced` is the light that facets send to each other, and the base area of the tile.
-    pub fn new(
+    /// sum, or 0. `bounced` is the light that facets send to each other, and the base area of the tile. `light_left_out` is
+    /// stated as it is.
+    pub(crate) fn new(
+        pairs: &PairCount,
         direct: &Direct,
         facets: &Facets,
         (material_of_slot, materials): (&[usize], &[Material]),
         second: Option<&Direct>,
         table: f64,
-        bounced: Option<(Arc<InterreflectionTable>, f64)>,
+        (bounced, light_left_out): (Option<(Arc<InterreflectionTable>, f64)>, Option<f64>),
     ) -> Self {
         let sum_of = |replicate: usize| {
             let of_replicate = |s: &usize| usize::from(facets.replicates[*s]) == replicate;
@@ -264,7 +293,7 @@ impl ErrorEstimator {
         };
         let replicates = if facets.replicates.is_empty() { Vec::new() } else { (0..REPLICATES).map(sum_of).collect() };
         let table = SAFETY_FACTOR * table;
-        let estimate = ErrorEstimate { rel_l2: table, table, ..ErrorEstimate::default() };
+        let estimate = ErrorEstimate { rel_l2: table, table, light_left_out, ..ErrorEstimate::default() };
         let mut estimator = Self {
             direct: direct.clone(),
             replicates,
@@ -274,7 +303,7 @@ impl ErrorEstimator {
             bounced,
             estimate,
         };
-        estimator.examine(second, table);
+        estimator.examine(pairs, second, table);
         estimator
     }
 
@@ -284,7 +313,10 @@ impl ErrorEstimator {
     }
 
     /// Standard error of `f̄` at each pair, without [`SAFETY_FACTOR`].
-    pub fn standard_errors(&self, pairs: &[Pair]) -> Vec<Vec3> {
+    ///
+    /// # Errors
+    /// [`crate::base::Error::Cancelled`].
+    pub fn standard_errors(&self, pairs: &[Pair], cancel: &Cancel) -> Result<Vec<Vec3>> {
         let of = |deviations: Deviations| {
             let facets = deviations.random_variance() * self.variance_ratio;
             let azimuths = deviations.coarse[0] * self.azimuth_ratio;
@@ -295,7 +327,7 @@ impl ErrorEstimator {
             let bounced = deviations.bounced * self.rel_error_of_bounced();
             (facets + visibility + table * table + bounced * bounced).map(f64::sqrt).as_vec3()
         };
-        pairs.par_iter().map(|pair| of(self.deviations(None, *pair))).collect()
+        cancel.map("standard errors", pairs.len(), |k| of(self.deviations(None, pairs[k])))
     }
 
     /// Relative error of the light between facets; 0 if it is left out.
@@ -303,8 +335,9 @@ impl ErrorEstimator {
         self.bounced.as_ref().map_or(0.0, |(bounced, _)| bounced.rel_error())
     }
 
-    fn examine(&mut self, second: Option<&Direct>, table: f64) {
-        let mut all = PAIRS.evaluate(|pair| self.deviations(second, pair), |at| at.f_bar + at.bounced);
+    fn examine(&mut self, pairs: &PairCount, second: Option<&Direct>, table: f64) {
+        let of = |pair| self.deviations(second, pair);
+        let mut all = pairs.evaluate(of, |at| at.f_bar + at.bounced, |at| at.coarse[0]);
         // The peak is that of pairs as they come.
         let Totals { peak, .. } = Totals::of(all.iter().map(|at| (1.0, at.f_bar + at.bounced)));
         let longer = mirror_biased_pairs((RETROREFLECTION_FACTOR - 1) * all.len(), RETROREFLECTION_SEED);
@@ -339,8 +372,18 @@ impl ErrorEstimator {
         let interreflection = self.rel_error_of_bounced() * stated(bounced);
         let rel_l2 = facets.hypot(visibility).hypot(table).hypot(interreflection);
         let psnr_db = totals.psnr_db(rel_l2);
-        self.estimate =
-            ErrorEstimate { rel_l2, psnr_db, facets, visibility, table, interreflection, azimuths, soft_step };
+        let light_left_out = self.estimate.light_left_out;
+        self.estimate = ErrorEstimate {
+            rel_l2,
+            psnr_db,
+            facets,
+            visibility,
+            table,
+            interreflection,
+            light_left_out,
+            azimuths,
+            soft_step,
+        };
     }
 
     /// The change of `f̄` from the resolution of the result to the first of others, and from each to the next.
@@ -415,8 +458,12 @@ mod tests {
 
     #[test]
     fn the_stated_error_of_a_draft_is_near_its_difference_from_a_fine_result() {
-        let pairs = mirror_biased_pairs(200, 5);
-        for (scene, azimuths) in [("fig1d_yellow_sides", 24), ("fig5d_pentagonal", 24), ("fig5d_pentagonal", 16)] {
+        // Few pairs hold most of the error of pyramids, so that 200 pairs show it badly. Of 2000 pairs on grooves, one along them,
+        // at 83°, may hold most of the error, which no estimate finds.
+        for (scene, azimuths, count) in
+            [("fig1d_yellow_sides", 24, 200), ("fig5d_pentagonal", 24, 2000), ("fig5d_pentagonal", 16, 2000)]
+        {
+            let pairs = mirror_biased_pairs(count, 5);
             let values = |outcome: &Outcome| -> Vec<Vec3> {
                 pairs.par_iter().map(|pair| outcome.brdf.eval(pair.i, pair.o)).collect()
             };
@@ -426,7 +473,7 @@ mod tests {
             let error = compare(&values(&draft), &values(&outcome(scene, &["quality.preset=fine", off]))).rel_l2;
             let stated = draft.errors().unwrap().estimate().rel_l2;
             assert!((error / 3.0..error * 3.0).contains(&stated), "{scene}, {azimuths} azimuths: {error} {stated}");
-            let errors = draft.errors().unwrap().standard_errors(&pairs);
+            let errors = draft.errors().unwrap().standard_errors(&pairs, &Cancel::default()).unwrap();
             let of_pairs = compare(&errors, &vec![Vec3::ZERO; pairs.len()]);
             assert!(errors.iter().all(|error| error.is_finite() && error.min_element() >= 0.0), "{of_pairs:?}");
         }
@@ -441,6 +488,29 @@ mod tests {
         assert!(few.facets > 4.0 * many.facets, "{few:?} {many:?}");
         let (few, many) = (stated("quality.azimuths=8"), stated("quality.azimuths=96"));
         assert!(few.visibility > 4.0 * many.visibility, "{few:?} {many:?}");
+    }
+
+    #[test]
+    fn errors_that_few_grazing_pairs_hold_are_found() {
+        // Gaps between rows of pyramids are open only in narrow ranges of the azimuth.
+        let pyramids = r#"{ kind = "pyramids", height = 0.36684, base_size = 0.47016, truncation = 0.18758, face_ratio = 0.34018, spacing = 0.40953, sides = 5, arrangement = "square", rotation_deg = 9.56597 }"#;
+        let with = |azimuths: usize| {
+            let settings = [
+                format!("tile.geometry={pyramids}"),
+                "material.default.brdf={kind=\"blinn_phong\", exponent=12, specular=0.3}".to_owned(),
+                "effects.interreflection=off".to_owned(),
+                "quality.adaptive=false".to_owned(),
+                format!("quality.azimuths={azimuths}"),
+            ];
+            outcome("fig5d_pentagonal", &settings.iter().map(String::as_str).collect::<Vec<_>>())
+        };
+        let (coarse, fine) = (with(48), with(384));
+        let pairs = mirror_biased_pairs(2000, 77);
+        let values = |outcome: &Outcome| outcome.brdf.eval_pairs(&pairs, &Cancel::default()).unwrap();
+        let error = compare(&values(&coarse), &values(&fine)).rel_l2;
+        let stated = coarse.errors().unwrap().estimate().rel_l2;
+        println!("true {error:.4}, stated {stated:.4}");
+        assert!(error > 0.03 && (0.6..2.0).contains(&(stated / error)), "{error} {stated}");
     }
 
     #[test]

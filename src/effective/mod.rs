@@ -21,7 +21,7 @@ pub use direct::facet_sum::FacetSum;
 pub use direct::forced::mean_colors;
 pub use effective_brdf::{EffectiveBrdf, Representation};
 pub use error_estimate::{ErrorBound, ErrorEstimate, ErrorEstimator};
-pub(crate) use error_estimate::{FACETS_POWER, SAFETY_FACTOR, SECOND_SAMPLE_DIVISOR};
+pub(crate) use error_estimate::{FACETS_POWER, FEW_PAIRS, PAIRS, SAFETY_FACTOR, SECOND_SAMPLE_DIVISOR};
 pub use gpu_tile::{GpuTileInput, GpuVisibilityInput, HeightMarchInput, ShadowMapInput, SliceInput};
 pub use low_rank::bvndf::VisibilityRows;
 pub use low_rank::rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
@@ -34,7 +34,7 @@ pub(crate) use shading_table::sampled_facets::subset_size;
 pub use shading_table::{Nodes, ShadingTable};
 pub use tint::Tint;
 pub use view_paths::{PathEnd, PathKind, VaryingSurface, ViewLobe, ViewLobes, ViewPaths, Viewer};
-pub use wu2011::{MaterialFactors, MaterialReport, VisibleFacets, Wu2011, Wu2011Report, Wu2011Settings};
+pub use wu2011::{MaterialFactors, VisibleFacets, Wu2011, Wu2011Settings};
 
 /// A reflectance that rendering can evaluate. Rendering knows nothing else of the small scale.
 pub trait Reflectance: Sync {

@@ -10,7 +10,7 @@ use crate::metrics::{Pair, mirror_biased_pairs};
 use crate::visibility::Resolution;
 
 /// Numbers of direction pairs.
-const QUICK_PAIRS: PairCount = PairCount { min: 16, min_effective: 1.5 };
+const QUICK_PAIRS: PairCount = PairCount { min: 16, min_effective: 1.5, max_for_errors: 0 };
 /// Fewer azimuths and a wider transition at once.
 const COARSE: Resolution = Resolution { azimuth_step: 2, softness: 2.0 };
 
@@ -45,7 +45,7 @@ pub(crate) fn quick_estimate(direct: &Direct, facets: &Facets) -> (ErrorEstimate
         let coarse = if has_coarse { f_bar_at(direct, COARSE, pair) - f_bar } else { DVec3::ZERO };
         (f_bar, (difference / area).length_squared() + coarse.length_squared(), area)
     };
-    let all = QUICK_PAIRS.evaluate(deviations, |at| at.0);
+    let all = QUICK_PAIRS.evaluate(deviations, |at| at.0, |_| DVec3::ZERO);
     let totals = Totals::of(all.iter().map(|at| (1.0, at.0)));
     if totals.norm > 0.0 {
         estimate.rel_l2 = SAFETY_FACTOR * (all.iter().map(|at| at.1).sum::<f64>() / totals.norm).sqrt();
@@ -91,14 +91,14 @@ pub(crate) fn estimate_of_bounced(
         ErrorEstimate { rel_l2, psnr_db, interreflection: rel_l2, ..ErrorEstimate::default() }
     };
     if known.quick.is_empty() {
-        known.quick = QUICK_PAIRS.evaluate(of, |at| at.0);
+        known.quick = QUICK_PAIRS.evaluate(of, |at| at.0, |_| DVec3::ZERO);
     }
     let quick = error(&known.quick);
     if quick.excess(bound) <= part {
         return quick;
     }
     if known.all.is_empty() {
-        known.all = PAIRS.evaluate(of, |at| at.0);
+        known.all = PAIRS.evaluate(of, |at| at.0, |_| DVec3::ZERO);
     }
     error(&known.all)
 }

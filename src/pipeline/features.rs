@@ -9,7 +9,7 @@ use crate::color_map::filter::is_naive_enough;
 use crate::effective::FacetSum;
 use crate::geometry::{ColorField, Facets};
 use crate::interreflection::mean_albedo;
-use crate::plan::{Backend, ColorMapFeatures, SceneFeatures, Settings, VisibilityMethod};
+use crate::plan::{Backend, ColorMapFeatures, LargeScaleFeatures, SceneFeatures, Settings, VisibilityMethod};
 use crate::scene::Scene;
 
 /// Everything that comes before the plan.
@@ -66,10 +66,8 @@ impl Pipeline {
             lookups: sum.measured_count(),
             narrowest_lobe: terms.filter_map(Term::roughness).fold(f32::INFINITY, f32::min),
             distinct_normals: sum.normal_count(),
-            object_self_shadows: !matches!(scene.object.kind.as_str(), "sphere" | "cylinder"),
-            lights: scene.light.count + scene.light.directional.len(),
+            large_scale: LargeScaleFeatures::of(scene),
             color_map: color_map_features(&tile.mesh.color),
-            lights_below: scene.light.directional.iter().filter(|light| light.direction.y < 0.0).count(),
         })
     }
 }

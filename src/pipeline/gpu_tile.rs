@@ -2,7 +2,7 @@
 
 use super::inputs::{Processor, TileInputs};
 use super::stages::{BuildCells, FindMirrorPlanes};
-use super::{Pipeline, StageTimes};
+use super::{Pipeline, StageTimes, notes};
 use crate::base::Result;
 use crate::effective::{
     FacetSum, GpuTileInput, GpuVisibilityInput, HeightMarchInput, Nodes, ShadowMapInput, SliceInput,
@@ -85,7 +85,7 @@ impl Pipeline {
         };
         let base_area = f64::from(tile.mesh.base_area());
         let nodes = grid.map(|grid| Nodes { mirrors, facets: Some(FACETS_PER_HALF_VECTOR), ..Nodes::all(grid) });
-        let notes = tile.mesh.notes.clone();
+        let notes = notes(&loaded.scene, &tile.mesh, &inputs.facets);
         let TileInputs { sum, plan, settings, .. } = inputs;
         let interpolation = settings.interpolation;
         let input = GpuTileInput { sum, visibility_input, base_area, nodes, interpolation };

@@ -268,7 +268,7 @@ impl Pipeline {
         let visibility = self.visibility(&inputs, &mut times)?;
         let key = outcome_key(&self.shading_keys(&inputs, &visibility), &inputs.materials.key);
         if let Some((_, outcome)) = lock(&self.last_outcome).as_ref().filter(|(last, _)| *last == key) {
-            return Ok(Outcome { times, ..outcome.clone() });
+            return Ok(Outcome { times, ..outcome.clone().for_scene(&loaded.scene) });
         }
         self.env.cancel.check()?;
         let refined = self.refined_sum(loaded, inputs, visibility, &mut times)?;

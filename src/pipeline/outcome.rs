@@ -13,10 +13,11 @@ use crate::brdf::Material;
 use crate::cache::{Cache, Key};
 use crate::diagnostics::{Health, HealthInputs, Limits};
 use crate::effective::{
-    Direct, EffectiveBrdf, ErrorEstimator, FacetSum, Reflectance, Representation, SECOND_SAMPLE_DIVISOR,
+    Direct, EffectiveBrdf, ErrorEstimator, FacetSum, PAIRS, Reflectance, Representation, SECOND_SAMPLE_DIVISOR,
 };
 use crate::metrics::Errors;
 use crate::plan::{Plan, Settings, VisibilityAlgorithm};
+use crate::scene::Scene;
 
 /// The effective BRDF of a scene, and how it was computed.
 #[derive(Debug, Clone)]
@@ -79,6 +80,12 @@ impl ExaminedSum {
 }
 
 impl Outcome {
+    /// The same outcome for a scene that differs only in its object and its lights.
+    pub fn for_scene(mut self, scene: &Scene) -> Self {
+        self.plan.decide_large_scale(scene);
+        self
+    }
+
     /// The same outcome for a caller that did not wait for it: without times.
     pub fn without_times(self) -> Self {
         Self { times: StageTimes::new(), ..self }
@@ -127,7 +134,8 @@ impl Outcome {
             Representation::Interreflecting(_, bounced) => Some((bounced.clone(), self.brdf.base_area)),
             _ => None,
         };
-        let new = || ErrorEstimator::new(&examined.direct, facets, slots, second.as_ref(), table, bounced);
+        let light = (bounced, self.plan.light_left_out);
+        let new = || ErrorEstimator::new(&PAIRS, &examined.direct, facets, slots, second.as_ref(), table, light);
         Ok(Some(self.estimator.get_or_init(new)))
     }
 

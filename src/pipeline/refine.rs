@@ -9,7 +9,7 @@ use super::stage::add_time;
 use super::{Keyed, Pipeline, StageTimes, VisibleSurface};
 use crate::base::Result;
 use crate::effective::{
-    Direct, ErrorBound, ErrorEstimate, ErrorEstimator, PairValues, estimate_of_bounced, quick_estimate,
+    Direct, ErrorBound, ErrorEstimate, ErrorEstimator, FEW_PAIRS, PairValues, estimate_of_bounced, quick_estimate,
 };
 use crate::interreflection::{InterreflectionSettings, InterreflectionTable};
 use crate::plan::{Preset, Refinement, Settings, finer_interreflection};
@@ -52,7 +52,8 @@ impl RefinedSum {
             }
         }
         let slots = (&material_of_slot[..], &materials.materials[..]);
-        self.estimate = Some(ErrorEstimator::new(&self.direct, facets, slots, None, 0.0, None).estimate());
+        self.estimate =
+            Some(ErrorEstimator::new(&FEW_PAIRS, &self.direct, facets, slots, None, 0.0, (None, None)).estimate());
     }
 
     /// A sentence about raised settings, if any were raised.

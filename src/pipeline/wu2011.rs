@@ -7,7 +7,7 @@ use super::inputs::TileInputs;
 use super::shading::{Shading, ShadingKeys};
 use super::stage::elapsed_ms;
 use super::stages::PaperTables;
-use super::{Outcome, Pipeline, StageTimes, material_names};
+use super::{Outcome, Pipeline, StageTimes, material_names, notes};
 use crate::base::Result;
 use crate::brdf::MaterialAssignment;
 use crate::diagnostics::{HealthInputs, VisibilityInput};
@@ -19,7 +19,7 @@ use crate::visibility::cancellable_maps_cpu;
 impl Pipeline {
     /// The paper's own method (Wu et al. 2011, Sec. 3.2 to 3.7): its directions, its facets, its truncations.
     pub(super) fn wu2011(&self, scene: &Scene, inputs: TileInputs, mut times: StageTimes) -> Result<Outcome> {
-        let TileInputs { tile, settings, materials, facets, material_of_slot, plan, .. } = inputs;
+        let TileInputs { tile, settings, materials, facets, material_of_slot, mut plan, .. } = inputs;
         let paper_settings =
             Wu2011Settings { seed: settings.seed, colors: settings.colors.unwrap_or(1), ..Wu2011Settings::default() };
         let start = Instant::now();
@@ -38,6 +38,7 @@ impl Pipeline {
         let tables =
             Wu2011::from_factors(&visible, &material_of_slot, &materials.materials, &factors, &paper_settings)?;
         times.push(("product", elapsed_ms(start)));
+        plan.note_times(&times);
         let brdf = Arc::new(EffectiveBrdf { representation: Representation::Wu2011(tables), base_area });
         let names = material_names(scene, &tile.mesh, &materials)?;
         let keys =
@@ -59,7 +60,7 @@ impl Pipeline {
             settings,
             times,
             factored: None,
-            notes: tile.mesh.notes.clone(),
+            notes: notes(scene, &tile.mesh, &facets),
             health_inputs,
             examined: Arc::default(),
             shading: Arc::new(shading),

@@ -1,6 +1,6 @@
 //! The choice of the algorithm that computes visibility.
 
-use super::{Costs, SceneFeatures, Settings, VisibilityMethod, is_on};
+use super::{Costs, Preset, SceneFeatures, Settings, VisibilityMethod, is_on};
 
 /// An algorithm that computes visibility.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,6 +23,9 @@ impl VisibilityAlgorithm {
     /// The algorithm for a scene. Shadow maps must be asked for: between their directions the error is large where light
     /// passes small holes, and no estimate shows it. A GPU draws them more slowly than a CPU cuts slices.
     pub(super) fn choose(features: &SceneFeatures, settings: &Settings) -> Self {
+        if settings.preset == Preset::Wu2011 {
+            return Self::CpuMaps;
+        }
         if !is_on(settings.effects.visibility, !features.flat && !is_shallow(features, settings)) {
             return Self::None;
         }

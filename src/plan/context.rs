@@ -48,7 +48,8 @@ impl<'a> Context<'a> {
         let table_pays = context.table_cost().is_some_and(|cost| {
             !features.flat && cost.compute_ms + cost.image_ms < context.direct_image_ms(costs.threads)
         });
-        context.try_shading_table = is_on(settings.effects.picture_table, table_pays);
+        let is_paper = settings.preset == Preset::Wu2011;
+        context.try_shading_table = !is_paper && is_on(settings.effects.picture_table, table_pays);
         context
     }
 
@@ -95,10 +96,11 @@ impl<'a> Context<'a> {
     fn wants_low_rank(&self) -> bool {
         let features = self.features;
         match self.settings.method {
+            _ if self.settings.preset == Preset::Wu2011 => true,
             ProductMethod::Direct => false,
             ProductMethod::LowRank => true,
             ProductMethod::Auto => {
-                !matches!(self.settings.preset, Preset::Reference | Preset::Wu2011)
+                self.settings.preset != Preset::Reference
                     && features.lookups > 0
                     && features.distinct_normals.is_none()
                     && self.low_rank_image_ms(ASSUMED_THREADS) < self.direct_image_ms(ASSUMED_THREADS)
@@ -108,6 +110,9 @@ impl<'a> Context<'a> {
 
     /// The cost of the coarsest shading table; `None` if images evaluate the BRDF itself at this quality.
     pub fn table_cost(&self) -> Option<TableCost> {
+        if self.settings.preset == Preset::Wu2011 {
+            return None;
+        }
         let saved = self.settings.effects.mirror_symmetry != Switch::Off;
         let mirrors = self.features.mirrors.filter(|_| saved).unwrap_or_default();
         self.settings.image_grids.first().map(|grid| TableCost {

@@ -5,8 +5,11 @@
 use super::algorithm::{SHALLOW_PART, maps_ms, max_blocked_part, scan_ms};
 use super::context::Context;
 use super::{
-    Effect, EffectKind, FAINT_FRACTION, LeftOut, VisibilityAlgorithm, VisibilityMethod, interreflection, is_on, methods,
+    Effect, EffectKind, FAINT_FRACTION, LargeScaleFeatures, LeftOut, Preset, VisibilityAlgorithm, VisibilityMethod,
+    interreflection, is_on, methods,
 };
+use crate::effective::Wu2011Settings;
+use crate::interreflection::BouncedShare;
 use crate::scene::{Effects, Switch};
 
 /// An effect and the function that decides it.
@@ -25,12 +28,13 @@ pub(super) struct Decision {
     predicted_ms: f64,
     /// An upper bound of the relative L2 change of `f̄` if the effect were turned on.
     bound: Option<f64>,
+    light: Option<BouncedShare>,
     left_out: Option<LeftOut>,
 }
 
 impl Decision {
     pub fn new(on: bool, reason: impl Into<String>) -> Self {
-        Self { on, reason: reason.into(), predicted_ms: 0.0, bound: None, left_out: None }
+        Self { on, reason: reason.into(), predicted_ms: 0.0, bound: None, light: None, left_out: None }
     }
 
     pub fn costs(self, predicted_ms: f64) -> Self {
@@ -41,8 +45,19 @@ impl Decision {
         Self { bound: Some(bound), ..self }
     }
 
+    pub fn adds(self, light: Option<BouncedShare>) -> Self {
+        Self { light, ..self }
+    }
+
     pub fn leaves_out(self, left_out: Option<LeftOut>) -> Self {
         Self { left_out, ..self }
+    }
+
+    fn effect(self, name: &'static str, kind: EffectKind, switch: Switch) -> Effect {
+        let Self { on, reason, predicted_ms, bound, light, left_out } = self;
+        let forced = switch != Switch::Auto;
+        let bound = bound.filter(|_| !on && !forced);
+        Effect { name, kind, on, reason, predicted_ms, measured_ms: None, forced, bound, light, left_out }
     }
 }
 
@@ -64,7 +79,12 @@ static ROWS: &[Row] = &[
         switch: Some(|effects| &mut effects.interreflection),
         decide: interreflection::decide,
     },
-    Row { name: "self_shadow", kind: Physics, switch: Some(|effects| &mut effects.self_shadow), decide: self_shadow },
+    Row {
+        name: "self_shadow",
+        kind: Physics,
+        switch: Some(|effects| &mut effects.self_shadow),
+        decide: |context, switch| self_shadow(context.features.large_scale, switch),
+    },
     Row { name: "anisotropy", kind: Physics, switch: Some(|effects| &mut effects.anisotropy), decide: anisotropy },
     Row { name: "slab", kind: Physics, switch: None, decide: slab },
     Row { name: "color_map_filtering", kind: Physics, switch: None, decide: color_map_filtering },
@@ -89,7 +109,7 @@ static ROWS: &[Row] = &[
     },
     Row { name: "measured_brdf", kind: OfScene, switch: None, decide: measured_brdf },
     Row { name: "projected_area", kind: OfScene, switch: None, decide: projected_area },
-    Row { name: "lights", kind: OfScene, switch: None, decide: lights },
+    Row { name: "lights", kind: OfScene, switch: None, decide: |context, _| lights(context.features.large_scale) },
     Row {
         name: "faint_lights",
         kind: OfScene,
@@ -122,20 +142,21 @@ pub(super) fn decide_all(context: &Context<'_>) -> Vec<Effect> {
     let mut forced = context.settings.effects.clone();
     let mut decide = |row: &Row| {
         let switch = row.switch.map_or(Switch::Auto, |field| *field(&mut forced));
-        let Decision { on, reason, predicted_ms, bound, left_out } = (row.decide)(context, switch);
-        Effect {
-            name: row.name,
-            kind: row.kind,
-            on,
-            reason,
-            predicted_ms,
-            measured_ms: None,
-            forced: switch != Switch::Auto,
-            bound: bound.filter(|_| !on && switch == Switch::Auto),
-            left_out,
-        }
+        (row.decide)(context, switch).effect(row.name, row.kind, switch)
     };
     ROWS.iter().map(&mut decide).collect()
+}
+
+/// Decides the rows of the object and the lights again, for a scene that differs in nothing else.
+pub(super) fn decide_large_scale(effects: &mut [Effect], large_scale: LargeScaleFeatures, switches: &Effects) {
+    for effect in effects {
+        let (decision, switch) = match effect.name {
+            "self_shadow" => (self_shadow(large_scale, switches.self_shadow), switches.self_shadow),
+            "lights" => (lights(large_scale), Switch::Auto),
+            _ => continue,
+        };
+        *effect = decision.effect(effect.name, effect.kind, switch);
+    }
 }
 
 /// The names of all effects that a field of `[effects]` forces, in the order of the table.
@@ -184,6 +205,12 @@ fn visibility(context: &Context<'_>, switch: Switch) -> Decision {
             ),
             scan_ms(features, settings, costs),
         ),
+        VisibilityAlgorithm::CpuMaps if settings.preset == Preset::Wu2011 => {
+            let (maps, texels) = (Wu2011Settings::VISIBILITY_DIRECTIONS, settings.map_resolution);
+            let part = maps as f64 / settings.map_grid.len() as f64;
+            let reason = format!("as in the paper: {maps} shadow maps of {texels} texels per side");
+            (reason, part * maps_ms(features, settings, costs))
+        }
         VisibilityAlgorithm::CpuMaps => (
             format!(
                 "{cause}: {} toroidal shadow maps of {} texels per side (occlusion intervals: {:.0} ms)",
@@ -220,15 +247,16 @@ fn no_visibility(context: &Context<'_>, switch: Switch) -> String {
 }
 
 fn overhangs(context: &Context<'_>, _: Switch) -> Decision {
-    if context.features.height_field || context.features.flat {
+    if context.settings.preset == Preset::Wu2011 {
+        Decision::new(true, "as in the paper: shadow maps see surfaces that overhang")
+    } else if context.features.height_field || context.features.flat {
         Decision::new(false, "no overhangs: one horizon per azimuth describes what a facet sees")
     } else {
         Decision::new(true, "surfaces overhang: more than one horizon per azimuth")
     }
 }
 
-fn self_shadow(context: &Context<'_>, switch: Switch) -> Decision {
-    let features = context.features;
+fn self_shadow(features: LargeScaleFeatures, switch: Switch) -> Decision {
     let reason = if !features.object_self_shadows {
         "the object is convex: it cannot shadow itself".to_owned()
     } else if features.lights == 0 {
@@ -328,8 +356,7 @@ fn projected_area(context: &Context<'_>, _: Switch) -> Decision {
     }
 }
 
-fn lights(context: &Context<'_>, _: Switch) -> Decision {
-    let features = context.features;
+fn lights(features: LargeScaleFeatures) -> Decision {
     let reason = match features.lights {
         0 => "no light".to_owned(),
         count => format!(

@@ -3,6 +3,7 @@
 use std::sync::LazyLock;
 
 use crate::interreflection::BouncedShare;
+use crate::scene::Scene;
 
 /// The properties of a scene on which the decisions rest.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,11 +40,28 @@ pub struct SceneFeatures {
     /// The smallest roughness of analytic lobes; infinite without.
     pub narrowest_lobe: f32,
     pub distinct_normals: Option<usize>,
+    pub large_scale: LargeScaleFeatures,
+    /// Colour maps; `None` for a scene without.
+    pub color_map: Option<ColorMapFeatures>,
+}
+
+/// Properties of the object and its lights, on which the effective BRDF does not depend.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LargeScaleFeatures {
     pub object_self_shadows: bool,
     pub lights: usize,
     pub lights_below: usize,
-    /// Colour maps; `None` for a scene without.
-    pub color_map: Option<ColorMapFeatures>,
+}
+
+impl LargeScaleFeatures {
+    /// The properties of a scene.
+    pub fn of(scene: &Scene) -> Self {
+        Self {
+            object_self_shadows: !matches!(scene.object.kind.as_str(), "sphere" | "cylinder"),
+            lights: scene.light.count + scene.light.directional.len(),
+            lights_below: scene.light.directional.iter().filter(|light| light.direction.y < 0.0).count(),
+        }
+    }
 }
 
 /// Properties of a scene's colour maps.

@@ -46,6 +46,11 @@ impl SceneFeatures {
         self.narrowest_lobe == f32::INFINITY && self.lookups == 0
     }
 
+    /// The part of the reflected light that facets send to each other and that is not computed; `None` if it was not measured.
+    pub fn light_left_out(&self, is_computed: bool) -> Option<f64> {
+        if is_computed || self.flat || self.materials == 0 { Some(0.0) } else { Some(self.bounced?.share) }
+    }
+
     fn can_interreflect(&self, settings: &Settings) -> bool {
         !self.flat && self.materials > 0 && settings.preset != Preset::Wu2011
     }
@@ -111,7 +116,8 @@ pub(super) fn decide(context: &Context<'_>, switch: Switch) -> Decision {
         tolerance,
         predicted_ms: ms,
     });
-    let decision = Decision::new(on, reason).costs(if on { ms } else { 0.0 }).leaves_out(left_out);
+    let decision =
+        Decision::new(on, reason).costs(if on { ms } else { 0.0 }).adds(features.bounced).leaves_out(left_out);
     // The share is no bound, unless there is nothing to add.
     if features.flat { decision.changes_at_most(ROUNDING) } else { decision }
 }

@@ -2,7 +2,7 @@
 
 use super::context::Context;
 use super::effects::{Decision, ROUNDING, SAME_NORMALS};
-use super::{IMAGE_CHECK_PAIRS, ProductMethod, is_on};
+use super::{IMAGE_CHECK_PAIRS, Preset, ProductMethod, is_on};
 use crate::scene::Switch;
 
 pub(super) fn low_rank(context: &Context<'_>, _: Switch) -> Decision {
@@ -13,6 +13,7 @@ pub(super) fn low_rank(context: &Context<'_>, _: Switch) -> Decision {
         context.low_rank_image_ms(costs.threads)
     );
     let reason = match settings.method {
+        _ if settings.preset == Preset::Wu2011 => "as in the paper: a basis for each BRDF".to_owned(),
         ProductMethod::Auto if on => format!(
             "{comparison}; used if within {:.1} % and {:.0} dB of the direct sum",
             settings.tolerance * 100.0,
@@ -58,6 +59,9 @@ pub(super) fn shading_table(context: &Context<'_>, _: Switch) -> Decision {
 }
 
 pub(super) fn exact_lobes(context: &Context<'_>, switch: Switch) -> Decision {
+    if context.settings.preset == Preset::Wu2011 {
+        return Decision::new(false, "as in the paper: a lobe for each direction of a grid");
+    }
     let normals = context.features.distinct_normals;
     let reason = match normals {
         Some(1) => "one normal: one exact lobe, for any number of facets".to_owned(),

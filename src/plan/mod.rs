@@ -21,13 +21,13 @@ pub use algorithm::VisibilityAlgorithm;
 use context::Context;
 pub use context::IMAGE_CHECK_PAIRS;
 pub use effects::{effect_names, switch_mut};
-pub use features::{ColorMapFeatures, Costs, SceneFeatures};
+pub use features::{ColorMapFeatures, Costs, LargeScaleFeatures, SceneFeatures};
 pub use refinement::{Refinement, finer_interreflection};
 pub use settings::{Backend, Preset, ProductMethod, Settings, VisibilityMethod};
 pub use slab::{SlabDecision, SlabFeatures, SlabSettings};
 
 use crate::interreflection::{BouncedShare, InterreflectionSettings};
-use crate::scene::Switch;
+use crate::scene::{Scene, Switch};
 
 /// The part of the program that an effect belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -56,6 +56,9 @@ pub struct Effect {
     /// An upper bound of the relative L2 change of `f̄` if the effect, which is off by itself, were turned on.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bound: Option<f64>,
+    /// The part of the reflected light that the effect adds or would add, if it was measured.
+    #[serde(flatten)]
+    pub light: Option<BouncedShare>,
     /// Light that is missing because the effect is off, if it may be more than the preset's tolerance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left_out: Option<LeftOut>,
@@ -82,10 +85,8 @@ pub struct Plan {
     pub try_low_rank: bool,
     /// The resolution at which the light that facets send to each other is added; `None` if it is not.
     pub interreflection: Option<InterreflectionSettings>,
-    /// The share of bounced light on which the decision rests; `None` if it was not measured.
-    pub bounced: Option<BouncedShare>,
-    /// Mirror planes x = const and y = const that save part of the directions.
-    pub mirrors: [bool; 2],
+    /// The part of the reflected light that facets send to each other and that is not computed; `None` if it was not measured.
+    pub light_left_out: Option<f64>,
     /// Try a table for images first. It must pass its check against the BRDF.
     pub try_shading_table: bool,
     /// All effects, physics first.
@@ -102,8 +103,7 @@ impl Plan {
             interreflection: context
                 .interreflection
                 .then(|| InterreflectionSettings { mirrors: context.mirrors(), ..settings.interreflection(features) }),
-            bounced: features.bounced,
-            mirrors: context.mirrors(),
+            light_left_out: features.light_left_out(context.interreflection),
             try_shading_table: context.try_shading_table,
             effects: effects::decide_all(&context),
         }
@@ -115,6 +115,11 @@ impl Plan {
             self.algorithm,
             VisibilityAlgorithm::OcclusionIntervals | VisibilityAlgorithm::CpuMaps | VisibilityAlgorithm::GpuMaps
         )
+    }
+
+    /// Decides the effects of the object and its lights again, for a scene that differs in nothing else.
+    pub fn decide_large_scale(&mut self, scene: &Scene) {
+        effects::decide_large_scale(&mut self.effects, LargeScaleFeatures::of(scene), &scene.effects);
     }
 
     /// Returns true if an effect is on.

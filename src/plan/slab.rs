@@ -148,7 +148,18 @@ impl SlabDecision {
 
 fn row(name: &'static str, on: bool, reason: String, predicted_ms: f64) -> Effect {
     let kind = EffectKind::Physics;
-    Effect { name, kind, on, reason, predicted_ms, measured_ms: None, forced: false, bound: None, left_out: None }
+    Effect {
+        name,
+        kind,
+        on,
+        reason,
+        predicted_ms,
+        measured_ms: None,
+        forced: false,
+        bound: None,
+        light: None,
+        left_out: None,
+    }
 }
 
 #[cfg(test)]

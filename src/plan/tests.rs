@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use glam::Vec3;
 
-use super::{Costs, EffectKind, Plan, Preset, SceneFeatures, Settings, VisibilityAlgorithm};
+use super::{Costs, EffectKind, LargeScaleFeatures, Plan, Preset, SceneFeatures, Settings, VisibilityAlgorithm};
 use crate::interreflection::BouncedShare;
 use crate::metrics::{compare, mirror_biased_pairs};
 use crate::pipeline::{Outcome, Pipeline};
@@ -135,9 +135,7 @@ fn features() -> SceneFeatures {
         lookups: 0,
         narrowest_lobe: 0.3,
         distinct_normals: None,
-        object_self_shadows: true,
-        lights: 4,
-        lights_below: 0,
+        large_scale: LargeScaleFeatures { object_self_shadows: true, lights: 4, lights_below: 0 },
         color_map: None,
     }
 }
@@ -196,6 +194,42 @@ fn interreflection_is_on_where_it_adds_more_than_the_preset_tolerates() {
     for switch in [Switch::Auto, Switch::On] {
         assert!(!is_on(0.9, Preset::Wu2011, switch), "the paper leaves interreflection out");
     }
+}
+
+#[test]
+fn a_result_that_is_used_again_describes_the_object_and_the_lights_of_the_present_scene() {
+    let pipeline = Pipeline::new();
+    let mut loaded = scene::open("default", &["quality.preset=draft".to_owned()]).unwrap();
+    let reasons = |outcome: &Outcome| -> Vec<String> {
+        outcome.plan.effects.iter().map(|effect| format!("{} {} {}", effect.name, effect.on, effect.reason)).collect()
+    };
+    let before = reasons(&pipeline.effective(&loaded).unwrap());
+    "sphere".clone_into(&mut loaded.scene.object.kind);
+    loaded.scene.light.count = 3;
+    let runs = pipeline.runs();
+    let after = reasons(&pipeline.effective(&loaded).unwrap());
+    assert_eq!(pipeline.runs(), runs, "nothing is computed again");
+    assert_ne!(before, after);
+    assert_eq!(after, reasons(&Pipeline::new().effective(&loaded).unwrap()));
+}
+
+#[test]
+fn the_plan_of_the_papers_method_describes_what_runs() {
+    let source = r#"
+        tile.geometry = { kind = "grooves" }
+        material = [{ name = "default", brdf = { kind = "lambertian" } }, { name = "botom", color = 0.5 }]
+        quality.preset = "wu2011"
+    "#;
+    let scene = scene::parse(source).unwrap();
+    let loaded = LoadedScene { scene, base_dir: PathBuf::new(), name: "test".to_owned(), painted: Painted::default() };
+    let outcome = Pipeline::new().effective(&loaded).unwrap();
+    let effect = |name: &str| outcome.plan.effects.iter().find(|effect| effect.name == name).unwrap();
+    for name in ["exact_lobes", "picture_table", "mirror_symmetry", "interreflection"] {
+        assert!(!effect(name).on, "{name}");
+    }
+    assert!(effect("visibility").reason.contains("132 shadow maps") && effect("visibility").measured_ms.is_some());
+    assert!(effect("low_rank").on && effect("overhangs").on);
+    assert!(outcome.notes.iter().any(|note| note.contains("botom")), "{:?}", outcome.notes);
 }
 
 #[test]

@@ -111,7 +111,8 @@ impl TargetReference {
     fn correction(&self, outcome: &Outcome) -> f64 {
         let Some(estimator) = outcome.errors() else { return 1.0 };
         let squares = |values: &[Vec3]| values.iter().map(|value| value.as_dvec3().length_squared()).sum::<f64>();
-        let here = (squares(&estimator.standard_errors(&self.pairs)) / squares(&self.f_bar)).sqrt();
+        let Ok(errors) = estimator.standard_errors(&self.pairs, &Cancel::default()) else { return 1.0 };
+        let here = (squares(&errors) / squares(&self.f_bar)).sqrt();
         let ratio = estimator.estimate().rel_l2 / SAFETY_FACTOR / here;
         if ratio.is_finite() { ratio.clamp(1.0 / MAX_CORRECTION, MAX_CORRECTION) } else { 1.0 }
     }

@@ -259,6 +259,15 @@ impl ImageWorker {
         let full = self.affordable(job, of_final, FINAL_MS);
         let mut preview = self.render(job, ShadedMaterial::Outcome(&outcome), of_final, full, 2, context.cancel)?;
         preview.grade = Grade::Final;
+        let all = fitting(job.size, MAX_PIXELS[usize::from(self.is_on_gpu())]);
+        if full != all {
+            let ([width, height], [x, y]) = (full, all);
+            preview.notes.push(format!(
+                "The image has {width} x {height} pixels in place of {x} x {y}, which would take longer than {:.0} s. An exported \
+                 image has all.",
+                FINAL_MS / 1000.0
+            ));
+        }
         // An image that is only on the GPU is rendered again if its tone map changes.
         *lock(&self.shared.last) = preview.radiance.is_some().then(|| finished(job, &preview, None));
         report(ImageResult::Rendered(Box::new(preview)));
@@ -323,6 +332,9 @@ impl ImageWorker {
         stages.extend(tone.map(|ms| ("tone", ms)));
         let mut notes = notes.clone();
         notes.extend(self.renderer.warnings());
+        // The plan of a tile outlives edits of the object and the lights.
+        let mut plan = plan.clone();
+        plan.decide_large_scale(&job.loaded.scene);
         Ok(RenderedPreview {
             version: job.version,
             grade: Grade::Draft,
@@ -337,7 +349,7 @@ impl ImageWorker {
             camera: camera.clone(),
             distance: self.renderer.distance(&camera, size),
             notes,
-            effects: plan.effects.clone(),
+            effects: plan.effects,
             preset: preset.name(),
         })
     }

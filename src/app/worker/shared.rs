@@ -48,7 +48,9 @@ impl SharedState {
     /// The BRDF at the scene's own quality, if it is the last that was computed.
     pub fn known(&self, loaded: &LoadedScene) -> Option<Outcome> {
         let best = lock(&self.best);
-        best.as_ref().filter(|(key, _)| *key == small_scale(loaded)).map(|(_, outcome)| outcome.clone())
+        best.as_ref()
+            .filter(|(key, _)| *key == small_scale(loaded))
+            .map(|(_, outcome)| outcome.clone().for_scene(&loaded.scene))
     }
 
     /// The interreflection of the last BRDF at a scene's own quality, if it differs from the scene only in settings of the

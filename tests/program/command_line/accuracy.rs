@@ -109,6 +109,7 @@ fn an_effect_can_be_forced_on_and_off_and_the_plan_shows_it() {
     let off = effect(&["--quality", "standard", "--effect", "interreflection=off"], "interreflection");
     assert!(off["on"] == false && off["left_out"]["share"].as_f64().unwrap() > 0.04, "{off}");
     let auto = effect(&["--quality", "standard"], "interreflection");
+    assert_eq!(auto["share"], off["share"], "the share is stated whether the light is computed or not");
     assert!(auto["on"] == true && auto["forced"] == false && auto["reason"].as_str().unwrap().contains('±'), "{auto}");
     assert_eq!(effect(&["--quality", "wu2011"], "interreflection")["on"], false);
     let on = effect(&["--effect", "interreflection=on"], "interreflection");

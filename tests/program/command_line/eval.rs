@@ -23,6 +23,34 @@ fn presets_state_an_error_of_each_pair_and_of_the_whole() {
 }
 
 #[test]
+fn the_stated_error_names_the_light_that_the_result_lacks() {
+    let folder = CommandLine::new();
+    folder.write("pairs.csv", PAIRS);
+    folder.write("scene.toml", GROOVES.replace("depth = 0.1", "depth = 0.4"));
+    folder.write("flat.toml", FLAT);
+    let left_out = |scene: &str, effect: &str| {
+        let arguments = [
+            "eval",
+            scene,
+            "--pairs",
+            "pairs.csv",
+            "-o",
+            "values.csv",
+            "--quiet",
+            "--json",
+            "--quality",
+            "standard",
+            "--effect",
+            effect,
+        ];
+        folder.json(&arguments)["error"]["light_left_out"].as_f64()
+    };
+    let [off, on] = ["off", "on"].map(|switch| left_out("scene.toml", &format!("interreflection={switch}")).unwrap());
+    assert!(off > 0.04 && on == 0.0, "{off} {on}");
+    assert_eq!(left_out("flat.toml", "interreflection=off"), Some(0.0));
+}
+
+#[test]
 fn a_flat_lambertian_tile_is_albedo_over_pi_times_the_cosine() {
     let folder = CommandLine::new();
     folder.write("flat.toml", FLAT);
