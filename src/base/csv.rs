@@ -28,7 +28,7 @@ impl CsvFile {
     /// Reads a file; `-` is standard input.
     ///
     /// # Errors
-    /// The file cannot be read, or it is empty.
+    /// The file cannot be read, it is empty, or a column occurs twice.
     pub fn read(path: &Path, expected_header: &str) -> Result<Self> {
         let mut text = String::new();
         let got = if path == Path::new("-") {
@@ -42,6 +42,11 @@ impl CsvFile {
             file.lines().next().map(|(_, header)| header.split(',').map(|name| name.trim().to_owned()).collect());
         file.names =
             names.ok_or_else(|| file.error("line 1".to_owned(), "an empty file".to_owned(), expected_header))?;
+        let is_again = |at: &usize| !file.names[*at].is_empty() && file.names[..*at].contains(&file.names[*at]);
+        if let Some(again) = (0..file.names.len()).find(is_again) {
+            let found = format!("the column `{}` twice", file.names[again]);
+            return Err(file.error("line 1".to_owned(), found, "each column once").into());
+        }
         Ok(file)
     }
 

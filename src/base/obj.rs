@@ -321,7 +321,10 @@ impl PrePass {
             let Some(index) = index.filter(|index| is_strict || *index <= count) else {
                 let what = ["vertex", "texture coordinate", "normal"][kind];
                 let last = if is_strict { String::new() } else { format!(" to {count}") };
-                let expected = format!("a {what} from 1{last} (or -1 to -{count})");
+                let expected = match count {
+                    0 => format!("a {what} that a line before the face defines"),
+                    _ => format!("a {what} from 1{last} (or -1 to -{count})"),
+                };
                 return Err(at(line, format!("`{part}` in `{word}`"), expected));
             };
             self.statements.push_str(part);

@@ -90,7 +90,8 @@ impl Key {
         &self.0
     }
 
-    pub(super) fn name(&self) -> String {
+    /// The key in hexadecimal digits.
+    pub fn name(&self) -> String {
         blake3::Hash::from_bytes(self.0).to_hex().to_string()
     }
 }

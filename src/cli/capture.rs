@@ -29,16 +29,23 @@ impl<'a> Outputs<'a> {
         for path in paths {
             let ending =
                 path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
-            match ending.as_str() {
-                "npz" => outputs.npz = Some(path),
-                "toml" => outputs.scene = Some(path),
-                "png" | "exr" => outputs.maps.push(path),
+            let twice = match ending.as_str() {
+                "npz" => outputs.npz.replace(path),
+                "toml" => outputs.scene.replace(path),
+                "png" | "exr" => {
+                    outputs.maps.push(path);
+                    None
+                }
                 _ => {
                     let expected = "names that end in .npz (the SVBTDF), .toml (a scene), .png or .exr (residuals)";
                     return Err(InputError::new("output", format!("the ending .{ending}"), expected)
                         .in_file(path)
                         .into());
                 }
+            };
+            if let Some(other) = twice {
+                let found = format!("`{}` and `{}`", other.display(), path.display());
+                return Err(InputError::new("output", found, format!("one name that ends in .{ending}")).into());
             }
         }
         if outputs.npz.is_none() {
@@ -126,15 +133,12 @@ fn report(args: &CaptureArgs, captured: &Captured) -> Result<()> {
     for warning in &health.warnings {
         print_on_stderr(format_args!("warning: {warning}"));
     }
-    let mut residuals = captured.residual.clone();
-    residuals.sort_by(f32::total_cmp);
-    let median = residuals.get(residuals.len() / 2).copied().unwrap_or(0.0);
     print_on_stderr(format_args!(
         "{} representatives of {} x {} pixels; residual: {:.1} % (median of the pixels); alpha: {:.2} (mean); smoothness: {}",
         figures.representatives,
         figures.pixels[0],
         figures.pixels[1],
-        100.0 * median,
+        100.0 * figures.median_residual,
         figures.alpha,
         figures.smoothness
     ));

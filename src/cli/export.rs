@@ -152,8 +152,8 @@ impl Report {
 /// The warning on a table that is read with a large error.
 fn warning(written: &ExportReport) -> Option<&'static str> {
     (!(0.0..=MAX_RESAMPLING_ERROR).contains(&written.reading.errors.rel_l2)).then_some(
-        "the table misses most of the highlights: choose a format that adapts to lobes (.bsdf, --radiance tensor-tree), raise \
-         --resolution if the format has it, or raise the roughness",
+        "the table misses most of the highlights: choose .bsdf, which adapts to lobes, raise --resolution if the format has it \
+         (64x64 for a tensor tree), or raise the roughness",
     )
 }
 

@@ -13,7 +13,6 @@ use crate::render::image::tone_map::ToneMap;
 use crate::render::render;
 use crate::render::{Image, RenderInput, RenderScene};
 use crate::scene::LoadedScene;
-use crate::slab::Slab;
 use anyhow::Result;
 use glam::Vec3;
 use serde::Serialize;
@@ -185,7 +184,7 @@ fn of_slab(args: &FitArgs, loaded: &LoadedScene, outcome: &SlabOutcome) -> Resul
     args.scene.warn(&outcome.health);
     let slab = &outcome.slab;
     let bar = progress_bar("fitting", args.scene.quiet);
-    let fitted = fit_slab(slab, &progress_on(&bar));
+    let fitted = fit::fit_slab(slab, &progress_on(&bar));
     bar.finish_and_clear();
     let fitted = fitted?;
     let report = slab_report(&fitted);
@@ -209,16 +208,6 @@ fn of_slab(args: &FitArgs, loaded: &LoadedScene, outcome: &SlabOutcome) -> Resul
         fitted.errors.psnr_db
     )?;
     Ok(())
-}
-
-/// Fits a thin surface to a slab.
-///
-/// # Errors
-/// As [`fit::fit_thin`].
-pub fn fit_slab(slab: &Slab, progress: &Progress<'_>) -> Result<ThinFit> {
-    let straight = slab.straight(glam::DVec3::Z)[0].as_vec3();
-    let eta = (slab.optics.eta.element_sum() / 3.0) as f32;
-    Ok(fit::fit_thin(slab, eta, straight, progress)?)
 }
 
 /// A fitted thin surface as `--json` prints it.

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use crate::base::{Error, InputError, print_on_stderr, regular_file, replace_file};
+use crate::cache::KeyBuilder;
 use crate::effective::EffectiveBrdf;
 use crate::reference::ReferenceSettings;
 use crate::render::RenderScene;
@@ -30,7 +31,7 @@ struct SavedProgress {
 
 #[derive(Debug, Serialize, Deserialize)]
 struct SavedScene {
-    /// Inputs of the reference and the points: the scene without its quality, and the number of pairs.
+    /// The key of everything that the reference and the points depend on, in hexadecimal digits.
     key: String,
     #[serde(rename = "truth")]
     reference: ReferenceValues,
@@ -99,11 +100,17 @@ fn command_line() -> String {
     std::iter::once("biscale".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" ")
 }
 
-/// Inputs of the reference and of the points of a scene.
+/// The key of the reference and of the points of a scene: the scene without its quality, its files, the pairs and the build.
 fn key(loaded: &LoadedScene, pairs: usize) -> Result<String> {
     let mut scene = loaded.scene.clone();
     scene.quality = crate::scene::Quality { seed: scene.quality.seed, ..Default::default() };
-    Ok(format!("{pairs} {}", serde_json::to_string(&scene)?))
+    let mut key = KeyBuilder::of_stage("report");
+    key.counts("pairs", [pairs]).numbers("scene", &serde_json::to_vec(&scene)?);
+    let pipeline = crate::gpu::pipeline();
+    for file in loaded.files() {
+        key.key("file", &pipeline.file_key(&loaded.base_dir, &file));
+    }
+    Ok(key.finish().name())
 }
 
 /// Writes and prints the quality levels by their stated errors, each as soon as it is known. Returns them, so that the
@@ -289,4 +296,29 @@ fn bar(quiet: bool, scene: &str) -> ProgressBar {
     }
     bar.set_prefix(scene.to_owned());
     bar
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_of_an_earlier_run_are_used_only_while_the_scene_its_files_and_the_pairs_are_the_same() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+        write("scene.toml", "[tile]\ngeometry = { kind = \"mesh\", path = \"tile.obj\" }\n");
+        write("tile.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+        let loaded = scene::open(&folder.path().join("scene.toml").to_string_lossy(), &[]).unwrap();
+        let key_of = |pairs| key(&loaded, pairs).unwrap();
+        let first = key_of(200);
+        assert_eq!(first, key_of(200));
+        assert_ne!(first, key_of(100));
+        let mut other = loaded.clone();
+        other.scene.quality.preset = "fine".to_owned();
+        assert_eq!(first, key(&other, 200).unwrap(), "the quality is no input of the reference");
+        other.scene.tile.size = [2.0, 1.0].into();
+        assert_ne!(first, key(&other, 200).unwrap());
+        write("tile.obj", "v 0 0 0\nv 1 0 0.1\nv 0 1 0\nf 1 2 3\n");
+        assert_ne!(first, key_of(200));
+    }
 }

@@ -10,6 +10,8 @@ const MAX_SKEWNESS: f64 = 0.1;
 const MAX_OUTSIDE: f64 = 0.01;
 /// Largest diffuse part of the light.
 const MAX_DIFFUSE: f64 = 0.3;
+/// Largest relative L2 of the model against the photographs.
+const MAX_RESIDUAL: f64 = 0.5;
 /// Largest part of broken values, and of pixels without a lobe.
 const MAX_BROKEN: f64 = 0.05;
 
@@ -21,6 +23,13 @@ impl Health {
             warnings.push(format!(
                 "{:.0} % of the pixels show no lobe: raise the exposure, or move the dots to where light passes straight",
                 100.0 * figures.dark
+            ));
+        }
+        if figures.median_residual > MAX_RESIDUAL {
+            warnings.push(format!(
+                "the model differs from the photographs by {:.0} %, so that the captured sheet is unusable: check the lengths (in \
+                 metres), directions and exposures of rig.toml",
+                100.0 * figures.median_residual
             ));
         }
         if figures.broken > MAX_BROKEN {
@@ -82,6 +91,7 @@ mod tests {
             (Figures { diffuse: 0.5, ..sound.clone() }, "50 %"),
             (Figures { broken: 0.2, ..sound.clone() }, "20 %"),
             (Figures { dark: 1.0, ..sound.clone() }, "100 %"),
+            (Figures { median_residual: 0.99, ..sound.clone() }, "99 %"),
         ];
         for (figures, part) in cases {
             let warnings = Health::of_capture(&figures).warnings;

@@ -30,6 +30,7 @@ use std::path::{Path, PathBuf};
 
 use crate::base::{Error, InputError, Progress, Result, atomic_file, check_output, replace_file};
 use crate::effective::EffectiveBrdf;
+use crate::scene::millimetres;
 
 pub use grid::ExportResolution;
 pub use meta::ExportMeta;
@@ -186,6 +187,9 @@ pub fn write(
     let format = ExportFormat::of(path)?;
     if let Some(resolution) = &options.resolution {
         resolution.check()?;
+    }
+    if format == ExportFormat::Radiance {
+        millimetres(&meta.tile_unit)?;
     }
     let task = ExportTask { brdf, meta, options, progress };
     // An unwritable path is reported before the long computation.

@@ -52,7 +52,10 @@ pub fn materialx(fit: &Fit, name: &str) -> String {
 
 /// A document with one OpenPBR surface: `nodes` before it, and its inputs.
 pub(super) fn document(nodes: &str, inputs: &str, name: &str) -> String {
-    let identifier: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+    // A name must not begin with a digit.
+    let prefix = if name.starts_with(|c: char| c.is_ascii_digit()) { "_" } else { "" };
+    let identifier: String =
+        prefix.chars().chain(name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' })).collect();
     format!(
         "<?xml version=\"1.0\"?>\n<materialx version=\"1.39\" colorspace=\"lin_rec709\">\n{nodes}  <open_pbr_surface name=\"{identifier}_surface\" \
          type=\"surfaceshader\">\n{inputs}  </open_pbr_surface>\n  <surfacematerial name=\"{identifier}\" type=\"material\">\n    <input \

@@ -24,7 +24,7 @@ use crate::metrics::{Errors, Pair, compare, mirror_biased_pairs};
 pub use gltf::gltf;
 pub use materialx::materialx;
 pub use models::{LobeShape, Model};
-pub use transmission::{ThinFit, fit_thin, thin_gltf, thin_materialx};
+pub use transmission::{ThinFit, fit_slab, thin_gltf, thin_materialx};
 
 use least_squares::NormalEquations;
 

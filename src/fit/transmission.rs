@@ -10,6 +10,7 @@ use crate::base::progress::{in_parallel, part};
 use crate::base::{Error, Progress, Result, require_finite};
 use crate::effective::Transmittance;
 use crate::metrics::{Errors, Pair, compare, mirror_biased_pairs};
+use crate::slab::Slab;
 use crate::slab::fresnel::reflectance;
 
 /// Number of pairs that are fitted, and of other pairs over which the error is measured.
@@ -73,12 +74,22 @@ fn solve(alpha: f64, eta: f64, pairs: &[Pair], targets: &[Vec3]) -> (DVec3, f64)
     (color, all - color.dot(product))
 }
 
+/// Fits a thin surface to a slab.
+///
+/// # Errors
+/// As [`fit_thin`].
+pub fn fit_slab(slab: &Slab, progress: &Progress<'_>) -> Result<ThinFit> {
+    let straight = slab.straight(DVec3::Z)[0].as_vec3();
+    let eta = (slab.optics.eta.element_sum() / 3.0) as f32;
+    fit_thin(slab, eta, straight, progress)
+}
+
 /// Fits a thin surface to what a slab transmits, by least squares of `f̄` over directions up to 60° from the normal.
 /// `straight` is the part of light along the normal that keeps its direction.
 ///
 /// # Errors
 /// [`Error::Cancelled`] if `progress` cancels, or a value that is not finite.
-pub fn fit_thin(slab: &dyn Transmittance, eta: f32, straight: Vec3, progress: &Progress<'_>) -> Result<ThinFit> {
+fn fit_thin(slab: &dyn Transmittance, eta: f32, straight: Vec3, progress: &Progress<'_>) -> Result<ThinFit> {
     let values = |pairs: &[Pair], progress: &Progress<'_>| {
         let values = in_parallel(pairs.len(), progress, |k| {
             let mut value = [Vec3::ZERO];

@@ -60,7 +60,7 @@ pub use schema::{Field, FieldShape, Kind, number};
 pub use slab::{Alpha, RoughFace, SlabFace, SlabMethod, SlabSpec, TableFace, TileFace};
 pub use tile::{
     Arrangement, Backing, CrossSection, Flat, FlatPattern, FloatPattern, Geometry, GrooveProfile, Grooves, Heightfield,
-    MeshFile, Pyramids, Rods, Tile, Weave, WeavePattern,
+    MeshFile, Pyramids, Rods, Tile, Weave, WeavePattern, millimetres,
 };
 pub use variants::{describes_material, variant};
 pub use view::{Camera, DirectionalSpec, Light, OBJECT_KINDS, Object, TONE_MAPS};

@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use glam::Vec2;
 use serde::{Deserialize, Serialize};
 
+use crate::base::{InputError, Result};
+
 use super::schema::{length, number, scene_choice, scene_table};
 use super::{Field, FieldShape, Kind};
 
@@ -15,7 +17,7 @@ pub struct Tile {
     /// Extent of the period in x and y, tile units.
     #[serde(default = "unit_square")]
     pub size: Vec2,
-    /// Name of the tile unit; only exports of true size (.stl, .svg, .pdf) depend on it.
+    /// Name of the tile unit; only exports of true size (.stl, .svg, .pdf) and sizes in Radiance files (.xml) depend on it.
     #[serde(default = "millimetre")]
     pub unit: String,
     /// Image of linear colour weights over the tile, projected along z; they multiply the materials.
@@ -34,6 +36,22 @@ fn unit_square() -> Vec2 {
 
 fn millimetre() -> String {
     "mm".to_owned()
+}
+
+/// The millimetres of a tile unit.
+///
+/// # Errors
+/// A name of no known unit.
+pub fn millimetres(unit: &str) -> Result<f64> {
+    Ok(match unit.trim().to_lowercase().as_str() {
+        "mm" | "millimetre" | "millimeter" => 1.0,
+        "cm" | "centimetre" | "centimeter" => 10.0,
+        "m" | "metre" | "meter" => 1000.0,
+        "um" | "µm" | "μm" | "micron" | "micrometre" | "micrometer" => 1e-3,
+        "nm" => 1e-6,
+        "in" | "inch" => 25.4,
+        _ => return Err(InputError::new("tile.unit", unit, "mm, cm, m, µm, nm or in, to know the size").into()),
+    })
 }
 
 impl Tile {

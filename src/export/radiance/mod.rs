@@ -12,6 +12,7 @@ use std::io::{self, Write};
 use glam::Vec3;
 
 use super::{ExportTask, Written};
+use crate::scene::millimetres;
 
 /// Division of the hemisphere into directions.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -57,7 +58,8 @@ pub fn write(task: &ExportTask<'_>, out: &mut dyn Write) -> io::Result<Written> 
         RadianceBasis::Klems => klems::tabulate(task)?,
         RadianceBasis::TensorTree => tensor_tree::tabulate(task)?,
     };
-    header(out, &task.meta.scene, task.meta.tile_size, 0.0, &content.definition)?;
+    let metres = millimetres(&task.meta.tile_unit).map_err(io::Error::other)? / 1000.0;
+    header(out, &task.meta.scene, (task.meta.tile_size, 0.0, metres), &content.definition)?;
     for (name, values) in &content.channels {
         block(out, name, "Reflection Back", content.basis, values)?;
     }
@@ -74,8 +76,14 @@ pub fn write(task: &ExportTask<'_>, out: &mut dyn Write) -> io::Result<Written> 
     Ok(written)
 }
 
-/// Everything before the blocks of data; `thickness` is in the unit of the tile.
-fn header(out: &mut dyn Write, scene: &str, [x, y]: [f32; 2], thickness: f32, definition: &str) -> io::Result<()> {
+/// Everything before the blocks of data. The size and the thickness are in the unit of the tile, which has so many metres.
+fn header(
+    out: &mut dyn Write,
+    scene: &str,
+    ([x, y], thickness, metres): ([f32; 2], f32, f64),
+    definition: &str,
+) -> io::Result<()> {
+    let [thickness, x, y] = [thickness, x, y].map(|length| (f64::from(length) * metres) as f32);
     writeln!(out, "<?xml version=\"1.0\" encoding=\"UTF-8\"?>")?;
     writeln!(out, "<WindowElement xmlns=\"http://windows.lbl.gov\">")?;
     writeln!(out, "<WindowElementType>System</WindowElementType>\n<Optical>\n<Layer>")?;

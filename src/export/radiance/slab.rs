@@ -11,7 +11,7 @@ use super::klems::{BASIS, KlemsPatch, definition, source_of};
 use super::{RadianceBasis, block, header, tensor_tree, xyz};
 use crate::base::{Progress, Result, atomic_file, check_output, progress, replace_file, require_finite};
 use crate::export::{ExportOptions, meta, note_path};
-use crate::scene::LoadedScene;
+use crate::scene::{LoadedScene, millimetres};
 use crate::slab::{DiscGrid, Slab};
 
 /// Directions along each side of a cell of incident light.
@@ -157,6 +157,7 @@ pub fn write(
     progress: &Progress<'_>,
 ) -> Result<(PathBuf, usize)> {
     let cells = Cells::of(options);
+    millimetres(&loaded.scene.tile.unit)?;
     let note = note_path(path);
     check_output(path, &[])?;
     check_output(&note, &[])?;
@@ -166,9 +167,9 @@ pub fn write(
         matrices.push(Matrix { name: kind.name, columns: matrix(slab, kind, &cells, &part)? });
     }
     let tile = &loaded.scene.tile;
-    let thickness = slab.optics.thickness as f32;
+    let (thickness, metres) = (slab.optics.thickness as f32, millimetres(&tile.unit)? / 1000.0);
     atomic_file::write_atomically(path, |out| {
-        header(out, &loaded.name, tile.size.to_array(), thickness, &cells.definition())?;
+        header(out, &loaded.name, (tile.size.to_array(), thickness, metres), &cells.definition())?;
         for matrix in &matrices {
             let (channels, basis) = cells.channels(matrix);
             for (name, values) in &channels {

@@ -15,7 +15,7 @@ use crate::base::atomic_file::replace_large_file;
 use crate::base::progress::part;
 use crate::base::{InputError, Progress, Result};
 use crate::geometry::TileMesh;
-use crate::scene::{BrdfSpec, Scene, TermSpec, Tile};
+use crate::scene::{BrdfSpec, Scene, TermSpec, Tile, millimetres};
 
 /// Options of a tile's files.
 #[derive(Debug, Clone, PartialEq)]
@@ -182,19 +182,6 @@ fn left_out(tile: &Tile) -> Option<String> {
         (Some(_), Some(_)) => "the images of colours and of materials (`tile.color_path`, `tile.slot_path`) are",
     };
     Some(format!("{painted} left out: each face stands in the plain material of its own slot"))
-}
-
-/// Returns the millimetres per tile unit.
-fn millimetres(unit: &str) -> Result<f64> {
-    Ok(match unit.trim().to_lowercase().as_str() {
-        "mm" | "millimetre" | "millimeter" => 1.0,
-        "cm" | "centimetre" | "centimeter" => 10.0,
-        "m" | "metre" | "meter" => 1000.0,
-        "um" | "µm" | "μm" | "micron" | "micrometre" | "micrometer" => 1e-3,
-        "nm" => 1e-6,
-        "in" | "inch" => 25.4,
-        _ => return Err(InputError::new("tile.unit", unit, "mm, cm, m, µm, nm or in, to know the size").into()),
-    })
 }
 
 /// Returns the colour of a slot's material on paper: the sum of its terms' colours, linear RGB.

@@ -10,6 +10,9 @@ use crate::base::obj::{self, Grammar, ObjCorner, ObjFile, Rules};
 use crate::geometry::{TileMesh, closure};
 use crate::scene::{MeshFile, files};
 
+/// Usual ratios of the area that a mesh covers to that of its tile. Others suggest different units.
+const USUAL_COVER: std::ops::Range<f64> = 0.01..10.0;
+
 /// Maximum size of a file, in bytes.
 const MAX_FILE: u64 = 1 << 30;
 
@@ -54,10 +57,24 @@ pub fn build(spec: &MeshFile, size: Vec2, base_dir: &Path) -> Result<TileMesh> {
         ));
     } else if !mesh.closes_plane {
         mesh.notes.push(format!(
-            "{} is not one closed sheet over the tile ({} open edges, {covered:.4} of the base area): its projected area is measured",
+            "{} is not one closed sheet over the tile ({} open edges, {covered:.4} of the base area): its projected area is measured, \
+             and the BRDF is that of its surface, without what is seen through holes",
             spec.path.display(),
             closure::open_edges(&mesh),
         ));
+        if !USUAL_COVER.contains(&covered) {
+            let span = |axis: usize| {
+                let values = mesh.positions.iter().map(|position| position[axis]);
+                values.clone().fold(f32::MIN, f32::max) - values.fold(f32::MAX, f32::min)
+            };
+            let Vec2 { x, y } = mesh.size;
+            mesh.notes.push(format!(
+                "{} spans {} x {}, and the tile {x} x {y}: check that both have the same unit",
+                spec.path.display(),
+                span(0),
+                span(1)
+            ));
+        }
     }
     Ok(mesh)
 }

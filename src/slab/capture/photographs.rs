@@ -6,7 +6,7 @@ use glam::{DMat3, DVec2, DVec3, UVec2, Vec3};
 use nalgebra::{SMatrix, SVector};
 use rayon::prelude::*;
 
-use super::rig::{Rig, RigCamera};
+use super::rig::Rig;
 use crate::base::{Cancel, InputError, Result};
 use crate::geometry::image_file;
 
@@ -211,11 +211,6 @@ fn rectification(corners: &[[f64; 2]; 4], camera: usize) -> Result<DMat3> {
         let expected = "four corners of a convex quadrilateral, in order";
         InputError::new(format!("camera.{camera}.corners"), format!("{corners:?}"), expected).into()
     })
-}
-
-/// The camera of an image pattern, for a rig that is to be written.
-pub fn camera(direction: DVec3, images: String) -> RigCamera {
-    RigCamera { direction: direction.to_array(), images, exposures: Vec::new(), dark: None, corners: None }
 }
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
 use super::*;
+use crate::slab::capture::rig::RigCamera;
 
 fn rig(extra: &str, camera: &str) -> Rig {
     Rig::parse(&format!(

@@ -76,6 +76,8 @@ pub struct Figures {
     pub broken: f64,
     /// Part of the pixels without a lobe.
     pub dark: f64,
+    /// Median over the pixels of the relative L2 of the model against the measured slice.
+    pub median_residual: f64,
 }
 
 /// Roughness of masking at the start (Sec. 4.2).
@@ -406,6 +408,9 @@ impl<'a> Sheet<'a> {
         let (size, grid) = (self.figures.pixels, self.fit.grid);
         let bounced = self.fit.bounced.clone().map(|light| SheetBounces::new(light, &models));
         let svbtdf = Svbtdf { size, optics, grid, models, neighbours, index, weight, scale, diffuse, bounced };
+        let mut sorted = residual.clone();
+        sorted.sort_by(f32::total_cmp);
+        self.figures.median_residual = sorted.get(sorted.len() / 2).map_or(0.0, |median| f64::from(*median));
         Captured { svbtdf, residual, figures: self.figures }
     }
 }

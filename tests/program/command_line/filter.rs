@@ -68,6 +68,7 @@ fn bad_queries_and_outputs_exit_with_2_name_what_was_expected_and_write_nothing(
     let cases = [
         ("mean,dev\n0,0\n", "--layer=snow", "one of the headers mean,deviation; a;"),
         ("", "--layer=snow", "found an empty file"),
+        ("mean,deviation,mean\n0,1,2\n", "--layer=snow", "the column `mean` twice"),
         ("mean,deviation\n0,-1\n", "--layer=snow", "a number that is not negative"),
         ("a\n-0.1\n", "--layer=snow", "`-0.1` for a"),
         ("a\nnan\n", "--layer=snow", "`nan` for a"),
