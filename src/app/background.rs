@@ -347,6 +347,11 @@ impl Editor {
             ImageResult::Failed(version, _) if version < self.document.version() => {}
             ImageResult::Failed(version, text) => {
                 self.object.fail(version);
+                // The image of the document before would pass for that of this one.
+                if self.object.preview.as_ref().is_some_and(|preview| preview.version < self.opened) {
+                    self.object.preview = None;
+                    self.tile.forget();
+                }
                 self.messages.put(Level::Error, "image", text);
             }
             ImageResult::Fault(text) => {

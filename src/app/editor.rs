@@ -84,6 +84,8 @@ pub struct Editor {
     pub(super) drawer: bool,
     /// True once a message names the effects that the scene leaves out.
     pub(super) noted_left_out: bool,
+    /// Version of the document when it was opened.
+    pub(super) opened: u64,
     /// The GPU failure that was reported last.
     pub(super) gpu_error: Option<String>,
 }
@@ -139,6 +141,7 @@ impl Editor {
             window_width: 0.0,
             drawer: false,
             noted_left_out: false,
+            opened: 0,
             gpu_error: None,
             size: [64, 64],
             pointer: Vec::new(),

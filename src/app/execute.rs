@@ -12,6 +12,7 @@ use super::editor::Editor;
 use super::layout::is_narrow;
 use super::messages::Level;
 use super::panels::{Tab, materials};
+use super::views::methods::MethodsState;
 use super::views::object;
 use super::views::tile::TileMode;
 
@@ -54,7 +55,8 @@ impl Editor {
             }
             Action::ExportTable => {
                 let name = format!("{}.npz", self.document.name);
-                self.browse(Purpose::ExportTable, &name);
+                let is_slab = self.document.scene().slab.is_some();
+                self.browse(if is_slab { Purpose::ExportSlab } else { Purpose::ExportTable }, &name);
             }
             Action::ExportTile => {
                 let name = format!("{}.obj", self.document.name);
@@ -109,6 +111,10 @@ impl Editor {
             }
             Action::SceneTab => self.tab = Tab::Scene,
             Action::CostTab => self.tab = Tab::Cost,
+            Action::Methods if !MethodsState::applies_to(self.document.scene()) => {
+                let text = "Only a scene with a slab or a colour map has methods to compare.";
+                self.messages.put(Level::Note, "methods", text);
+            }
             Action::Methods => self.methods.on = !self.methods.on,
             Action::BackToA => {
                 if let Some(comparison) = &self.object.comparison {
@@ -134,7 +140,7 @@ impl Editor {
                 if !self.object.picking {
                     (self.lobe.viewer, self.tile.picked) = (None, None);
                     if self.tile.show == TileMode::Contribution {
-                        self.tile.show = TileMode::Clay;
+                        self.tile.show = self.tile.before_pick.take().unwrap_or(TileMode::Clay);
                     }
                 }
             }
@@ -176,6 +182,7 @@ impl Editor {
         self.document = document;
         // Version numbers continue, so that an image of the old document never matches the new one.
         self.document.start_at(version);
+        self.opened = version;
         self.accuracy.forget();
         self.targets.forget();
         self.object.refined_effects = None;

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use crate::base::Result;
+use crate::export::slab::SlabFormat;
 use crate::export::tile::TileOptions;
 use crate::metrics::mirror_biased_pairs;
 use crate::scene::{BrdfSpec, Geometry};
@@ -108,7 +109,9 @@ impl Editor {
             }
             Purpose::Environment => scene.light.environment = relative.to_string_lossy().into_owned(),
             Purpose::SavePaint(layer) => return self.save_image(&path, layer),
-            Purpose::ExportTable if path.extension().is_some_and(|ending| ending == "gltf" || ending == "mtlx") => {
+            Purpose::ExportTable | Purpose::ExportSlab
+                if path.extension().is_some_and(|ending| ending == "gltf" || ending == "mtlx") =>
+            {
                 self.dialog = Some(Dialog::Fit { path });
                 return;
             }
@@ -116,8 +119,12 @@ impl Editor {
                 self.dialog = Some(Dialog::Tile { path, options: TileOptions::default() });
                 return;
             }
-            Purpose::ExportTable => {
-                match crate::export::check_ending(&path) {
+            Purpose::ExportTable | Purpose::ExportSlab => {
+                let checked = match purpose {
+                    Purpose::ExportSlab => SlabFormat::of(&path).map(drop),
+                    _ => crate::export::check_ending(&path),
+                };
+                match checked {
                     Ok(()) => self.dialog = Some(Dialog::Table { path, choice: TableChoice::default() }),
                     Err(error) => self.messages.put(Level::Error, "export", error.to_string()),
                 }

@@ -217,7 +217,9 @@ impl Editor {
             let value = |brdf: &EffectiveBrdf| brdf.eval(self.lobe.light, picked.viewer).max_element();
             let value = preview.brdf.as_deref().map_or(0.0, value);
             self.tile.picked = Some((picked.viewer, 4.0 * value));
-            self.tile.show = TileMode::Contribution;
+            if self.tile.show != TileMode::Contribution {
+                self.tile.before_pick = Some(std::mem::replace(&mut self.tile.show, TileMode::Contribution));
+            }
         }
     }
 

@@ -14,6 +14,7 @@ use super::paint::{self, Stroke, Tool};
 use super::panels::paints;
 use super::views::brushes::{BrushRequest, PaintLayer};
 use super::views::pointer::Pointer;
+use super::views::tile::TileMode;
 
 impl Editor {
     /// Applies pointer input on the tile.
@@ -52,6 +53,10 @@ impl Editor {
         };
         if is_ready {
             self.messages.clear("paint");
+            // Clay has neither colours nor materials.
+            if matches!(self.tile.brush.tool, Tool::Color | Tool::Material) && self.tile.show == TileMode::Clay {
+                self.tile.show = TileMode::Materials;
+            }
             self.stroke = Some(Stroke::begin(self.document.painted()));
         }
         is_ready

@@ -47,7 +47,7 @@ impl Pipeline {
         processor: Processor,
         times: &mut StageTimes,
     ) -> Result<TileInputs> {
-        super::slab::refuse_slab(loaded, "this command")?;
+        super::slab::refuse_slab(loaded, "this computation")?;
         let scene = &loaded.scene;
         let tile = self.tile(loaded, times)?;
         let mut settings = Settings::of(scene);

@@ -39,7 +39,7 @@ impl Pipeline {
     /// # Errors
     /// As [`Pipeline::effective`].
     pub fn with_reference<T>(&self, loaded: &LoadedScene, work: impl FnOnce(&Reference<'_>) -> T) -> Result<T> {
-        refuse_slab(loaded, "this command")?;
+        refuse_slab(loaded, "this computation")?;
         let mut times = StageTimes::new();
         let tile = self.tile(loaded, &mut times)?;
         let assignment = self.assignment(loaded, &tile, &mut times)?;

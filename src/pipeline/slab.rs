@@ -32,7 +32,7 @@ pub struct SlabOutcome {
     pub svbtdf: Option<Arc<Svbtdf>>,
 }
 
-/// Checks that a scene has no slab, before a `command` that does not support slabs.
+/// Checks that a scene has no slab, before a command or a computation that does not support slabs.
 ///
 /// # Errors
 /// The scene has a slab.
@@ -41,7 +41,7 @@ pub fn refuse_slab(loaded: &LoadedScene, command: &str) -> Result<()> {
         return Ok(());
     }
     let expected = format!(
-        "a scene without it: {command} knows no slabs; `eval`, `transmit`, `render`, `export`, `fit`, `rig`, `plan` and `profile` do"
+        "a scene without it: {command} knows no slabs; the commands `eval`, `transmit`, `render`, `export`, `fit`, `rig`, `plan` and `profile` do"
     );
     Err(InputError::new("slab", "a scene with a slab", expected).in_file(&loaded.name).into())
 }

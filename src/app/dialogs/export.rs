@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::within;
 use crate::export::RadianceBasis;
 use crate::export::tile::TileOptions;
 use eframe::egui::{self, Context, DragValue, Grid, Ui};
@@ -40,6 +41,11 @@ pub fn table_ui(
         match ending.as_str() {
             _ if crate::export::grid_is_free(path) => grid_ui(ui, choice, &ending),
             "bsdf" => rgl_ui(ui, choice),
+            _ if path.to_string_lossy().ends_with(crate::export::mitsuba::ENDING) => {
+                drop(ui.label(
+                    "The file is a scene of Mitsuba 3: both faces as rough sheets, with the camera and the background.",
+                ));
+            }
             "xml" => radiance_ui(ui, choice),
             _ => drop(ui.label("This format has a fixed grid of directions.")),
         }
@@ -175,7 +181,7 @@ fn export_dialog(
 ) -> Option<ExportDecision> {
     let mut decision = None;
     let modal = egui::Modal::new(egui::Id::unique(title)).show(ctx, |ui| {
-        ui.set_width(440.0);
+        ui.set_width(within(ctx, 440.0, 40.0, 0));
         ui.heading(title);
         ui.label(path.display().to_string());
         ui.add_space(6.0);

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use eframe::egui::{self, Key, RichText, ScrollArea, Ui};
 
+use super::within;
 use crate::app::panels::{DriverPlace, SlabFile};
 use crate::app::views::brushes::PaintLayer;
 
@@ -30,6 +31,8 @@ pub enum Purpose {
     Environment,
     SavePaint(PaintLayer),
     ExportTable,
+    /// The material of a scene with a slab.
+    ExportSlab,
     ExportTile,
     ExportImage,
     ExportSweep,
@@ -56,7 +59,7 @@ impl Purpose {
             Self::SavePaint(PaintLayer::Heights) => "Save the heights",
             Self::SavePaint(PaintLayer::Colors) => "Save the colours",
             Self::SavePaint(PaintLayer::Slots) => "Save the painted materials",
-            Self::ExportTable => "Export the material",
+            Self::ExportTable | Self::ExportSlab => "Export the material",
             Self::ExportTile => "Export the tile",
             Self::ExportImage => "Export the image",
             Self::ExportSweep => "Save the specification of a sweep",
@@ -80,13 +83,22 @@ impl Purpose {
             Self::SavePaint(PaintLayer::Slots) => &["png"],
             Self::SavePaint(_) | Self::ExportImage => &["png", "exr"],
             Self::ExportTable => &["npz", "csv", "exr", "bsdf", "binary", "xml", "bin", "astm", "gltf", "mtlx"],
+            Self::ExportSlab => &["npz", "xml", "gltf", "mtlx"],
             Self::ExportTile => &["obj", "stl", "png", "svg", "pdf"],
         }
     }
 
     pub fn saves(&self) -> bool {
-        let exports = matches!(self, Self::ExportTable | Self::ExportTile | Self::ExportImage | Self::ExportSweep);
-        exports || matches!(self, Self::SaveScene | Self::SavePaint(_))
+        matches!(
+            self,
+            Self::ExportTable
+                | Self::ExportSlab
+                | Self::ExportTile
+                | Self::ExportImage
+                | Self::ExportSweep
+                | Self::SaveScene
+                | Self::SavePaint(_)
+        )
     }
 }
 
@@ -152,7 +164,7 @@ impl FileDialog {
     pub fn ui(&mut self, ctx: &egui::Context) -> Option<Option<PathBuf>> {
         let mut result = None;
         let modal = egui::Modal::new(egui::Id::unique("files")).show(ctx, |ui| {
-            ui.set_width(560.0);
+            ui.set_width(within(ctx, 560.0, 40.0, 0));
             ui.heading(self.purpose.title());
             ui.add_space(4.0);
             result = self.body(ui);
@@ -176,7 +188,8 @@ impl FileDialog {
         });
         let mut chosen = false;
         egui::Frame::canvas(ui.style()).inner_margin(4).show(ui, |ui| {
-            ScrollArea::vertical().max_height(280.0).min_scrolled_height(280.0).auto_shrink([false, false]).show(
+            let height = within(ui.ctx(), 280.0, 240.0, 1);
+            ScrollArea::vertical().max_height(height).min_scrolled_height(height).auto_shrink([false, false]).show(
                 ui,
                 |ui| {
                     for (name, is_folder) in &self.entries {

@@ -24,6 +24,15 @@ const MATERIALS: [Format; 11] = [
     (".mtlx", "MaterialX", "film and CAD programs; a fit"),
 ];
 
+/// Formats of the material of a slab: tables of what it transmits and reflects, a scene, then fits.
+const SLABS: [Format; 5] = [
+    (".npz", "NumPy arrays", "Python"),
+    (".xml", "Radiance", "Radiance, EnergyPlus, daylight programs"),
+    ("_mitsuba.xml", "Mitsuba scene", "Mitsuba 3; two rough faces"),
+    (".gltf", "glTF", "game engines, the web; a fit"),
+    (".mtlx", "MaterialX", "film and CAD programs; a fit"),
+];
+
 const TILES: [Format; 5] = [
     (".obj", "Triangles", "modellers, and this program again as a mesh"),
     (".stl", "Solid", "3D printers"),
@@ -36,6 +45,7 @@ const TILES: [Format; 5] = [
 pub fn of(purpose: &Purpose) -> Option<&'static [Format]> {
     match purpose {
         Purpose::ExportTable => Some(&MATERIALS),
+        Purpose::ExportSlab => Some(&SLABS),
         Purpose::ExportTile => Some(&TILES),
         _ => None,
     }
@@ -81,6 +91,16 @@ fn with_ending(formats: &[Format], name: &str, at: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_format_offered_for_a_slab_is_accepted() {
+        for (at, (ending, ..)) in SLABS.iter().enumerate() {
+            let name = with_ending(&SLABS, "my.pane.npz", at);
+            assert_eq!(name, format!("my.pane{ending}"));
+            let is_table = crate::export::slab::SlabFormat::of(Path::new(&name)).is_ok();
+            assert_ne!(is_table, [".gltf", ".mtlx"].contains(ending), "{ending}");
+        }
+    }
 
     #[test]
     fn every_export_format_is_offered_and_accepted() {

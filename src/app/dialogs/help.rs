@@ -2,6 +2,7 @@
 
 use eframe::egui::{self, Context, Grid, RichText, ScrollArea};
 
+use super::within;
 use crate::app::actions;
 
 const TASKS: [(&str, &str); 16] = [
@@ -99,7 +100,8 @@ pub fn help_ui(ctx: &Context) -> bool {
         .default_pos(ctx.content_rect().center())
         .collapsible(false)
         .show(ctx, |ui| {
-            ScrollArea::vertical().max_height(560.0).min_scrolled_height(460.0).show(ui, |ui| {
+            let [most, least] = [560.0, 460.0].map(|height| within(ctx, height, 90.0, 1));
+            ScrollArea::vertical().max_height(most).min_scrolled_height(least).show(ui, |ui| {
                 for (task, steps) in TASKS {
                     ui.label(RichText::new(task).strong());
                     ui.label(steps);

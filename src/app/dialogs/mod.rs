@@ -23,6 +23,11 @@ use super::actions::Action;
 use super::document::RecoveredDocument;
 use super::worker::TableChoice;
 
+/// A width (`axis` 0) or a height (`axis` 1) that leaves `rest` of the window free, at most `most` [points].
+fn within(ctx: &Context, most: f32, rest: f32, axis: usize) -> f32 {
+    most.min(ctx.content_rect().size()[axis] - rest).max(60.0)
+}
+
 /// The open dialog.
 #[derive(Debug)]
 pub enum Dialog {

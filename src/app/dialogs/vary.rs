@@ -5,13 +5,14 @@ use std::sync::Arc;
 
 use eframe::egui::{self, ColorImage, Context, Grid, Id, Image, Sense, TextureHandle, Ui, vec2};
 
+use super::within;
 use crate::app::worker::ThumbnailJob;
 use crate::scene::{LoadedScene, Scene, variant};
 
 /// Variants per side of the square that shows them.
 const PER_SIDE: usize = 3;
-/// Side of an image [points].
-const SIDE: f32 = 150.0;
+/// Largest side of an image [points].
+const MAX_SIDE: f32 = 150.0;
 
 /// Nine random variants of a scene with their images.
 pub struct Variants {
@@ -64,13 +65,17 @@ impl Variants {
     pub fn ui(&mut self, ctx: &Context) -> Option<Option<Scene>> {
         let mut result = None;
         let modal = egui::Modal::new(Id::unique("vary")).show(ctx, |ui| {
-            ui.set_width(PER_SIDE as f32 * (SIDE + 6.0));
+            let row = PER_SIDE as f32 * MAX_SIDE;
+            let side = within(ctx, row, 60.0, 0).min(within(ctx, row, 170.0, 1)) / PER_SIDE as f32;
+            ui.set_width(PER_SIDE as f32 * (side + 6.0));
             ui.heading("Vary the material");
-            ui.label("Each number of the surface, the materials and the colour map is changed by up to 20 %.");
+            ui.label(
+                "Each number of the surface, the materials, the slab and the colour map is changed by up to 20 %.",
+            );
             ui.add_space(6.0);
             Grid::new("variants").spacing([6.0, 6.0]).show(ui, |ui| {
                 for at in 0..self.scenes.len() {
-                    if self.item(ui, at) {
+                    if self.item(ui, at, side) {
                         result = Some(self.scenes[at].clone());
                     }
                     if at % PER_SIDE == PER_SIDE - 1 {
@@ -95,8 +100,8 @@ impl Variants {
     }
 
     /// Draws a variant and returns true if it is clicked.
-    fn item(&self, ui: &mut Ui, at: usize) -> bool {
-        let (rect, response) = ui.allocate_exact_size(vec2(SIDE, SIDE), Sense::click());
+    fn item(&self, ui: &mut Ui, at: usize, side: f32) -> bool {
+        let (rect, response) = ui.allocate_exact_size(vec2(side, side), Sense::click());
         let name = format!("Variant {}", at + 1);
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, self.scenes[at].is_some(), &name));
         match &self.images[at] {

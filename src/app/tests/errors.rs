@@ -228,3 +228,22 @@ fn a_scene_that_cannot_be_computed_is_reported_and_no_spinner_stays() {
     editor(&mut harness).action(&ctx, Action::Redo);
     wait_for(&mut harness, "Shows the last image that could be computed: see the message");
 }
+
+#[test]
+fn a_scene_that_cannot_be_computed_does_not_show_the_image_of_the_scene_before() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("relief.toml");
+    std::fs::write(&path, "[tile]\ngeometry = { kind = \"heightfield\", path = \"gone.png\" }\n").unwrap();
+    let mut harness = harness(quick());
+    settle(&mut harness);
+    assert!(editor(&mut harness).object.preview.is_some());
+    editor(&mut harness).open(&path.to_string_lossy());
+    let start = std::time::Instant::now();
+    while harness.query_by_label("No image could be computed: see the message").is_none() {
+        harness.step();
+        assert!(start.elapsed().as_secs() < 60, "{:?}", editor(&mut harness).messages.texts());
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    let editor = editor(&mut harness);
+    assert!(editor.object.preview.is_none() && editor.tile.rendered.is_none());
+}

@@ -2,11 +2,14 @@
 
 use crate::export::tile::TileOptions;
 use eframe::egui::{Key, Modifiers};
+use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
 use super::{editor, harness, quick, settle};
+use crate::app::actions::Action;
 use crate::app::dialogs::{Dialog, FileDialog, Purpose};
 use crate::app::document::Document;
+use crate::app::editor::Editor;
 use crate::app::worker::{ExportKind, TableChoice};
 
 #[test]
@@ -82,6 +85,18 @@ fn a_large_solid_is_cancelled_while_it_is_computed_and_the_next_export_runs() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "no partial file remains");
 }
 
+/// Runs the interface until the export has ended, and returns all messages.
+fn messages_after_export(harness: &mut Harness<'static, Option<Editor>>) -> String {
+    let start = std::time::Instant::now();
+    harness.run_steps(2);
+    while editor(harness).exporting.is_some() {
+        harness.step();
+        assert!(start.elapsed().as_secs() < 60, "{:?}", editor(harness).messages.texts());
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    editor(harness).messages.texts().join("; ")
+}
+
 #[test]
 fn every_format_of_the_tile_and_of_fits_is_exported_from_its_dialog() {
     let folder = tempfile::tempdir().unwrap();
@@ -94,16 +109,41 @@ fn every_format_of_the_tile_and_of_fits_is_exported_from_its_dialog() {
         editor(&mut harness).use_file(&ctx, purpose, path.clone());
         harness.run_steps(2);
         harness.get_by_label("Export").click();
-        let start = std::time::Instant::now();
-        harness.run_steps(2);
-        while editor(&mut harness).exporting.is_some() {
-            harness.step();
-            assert!(start.elapsed().as_secs() < 60, "{ending}");
-            std::thread::sleep(std::time::Duration::from_millis(10));
-        }
-        let texts = editor(&mut harness).messages.texts().join("; ");
+        let texts = messages_after_export(&mut harness);
         assert!(texts.contains("Wrote") && std::fs::metadata(&path).unwrap().len() > 100, "{ending}: {texts}");
     }
+}
+
+#[test]
+fn the_material_and_the_image_of_a_slab_are_exported_in_every_format() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("pane.toml");
+    let slab = "[slab]\neta = 1.5\n[slab.top]\nkind = \"smooth\"\n[slab.bottom]\nkind = \"ggx\"\nroughness = 0.1\n";
+    let text = format!("[tile]\ngeometry = {{ kind = \"flat\" }}\n{slab}[quality]\npreset = \"draft\"\n");
+    std::fs::write(&scene, text).unwrap();
+    let mut harness = harness(Document::open(&scene.to_string_lossy()).unwrap());
+    let ctx = harness.ctx.clone();
+    editor(&mut harness).execute(&ctx, Action::ExportTable);
+    let Some(Dialog::Files(files)) = &editor(&mut harness).dialog else { panic!("no dialog") };
+    assert_eq!(files.purpose, Purpose::ExportSlab);
+    editor(&mut harness).dialog = None;
+    for name in ["a.npz", "a.xml", "a_mitsuba.xml", "a.gltf", "a.mtlx", "a.png"] {
+        let path = folder.path().join(name);
+        let purpose = if name == "a.png" { Purpose::ExportImage } else { Purpose::ExportSlab };
+        editor(&mut harness).use_file(&ctx, purpose, path.clone());
+        match &mut editor(&mut harness).dialog {
+            Some(Dialog::Table { choice, .. }) => *choice = TableChoice { theta: 3, phi: 4, ..*choice },
+            Some(Dialog::Image { width, height, .. }) => (*width, *height) = (32, 32),
+            _ => {}
+        }
+        harness.run_steps(2);
+        harness.get_by_label("Export").click();
+        let texts = messages_after_export(&mut harness);
+        assert!(texts.contains(name) && std::fs::metadata(&path).unwrap().len() > 100, "{name}: {texts}");
+    }
+    editor(&mut harness).use_file(&ctx, Purpose::ExportSlab, folder.path().join("a.csv"));
+    let texts = editor(&mut harness).messages.texts().join("; ");
+    assert!(texts.contains("a name that ends in .npz"), "{texts}");
 }
 
 #[test]

@@ -157,7 +157,7 @@ fn font() -> FontId {
 pub fn describe(image: &MethodImage) -> String {
     let mut text = image.name.to_owned();
     if let Some(difference) = image.difference {
-        text += &format!(": {:.1} % from the truth", 100.0 * difference);
+        text += &format!(": {:.1} % from the reference", 100.0 * difference);
     }
     match image.noise {
         Some(noise) => text += &format!("\nstandard error {:.1} %, {} passes", 100.0 * noise, image.passes),

@@ -44,7 +44,8 @@ impl ObjectView {
                     action = Some(choice);
                 }
             }
-            let tip = "Show the methods for this scene beside each other, with the truth and its standard error (M)";
+            let tip =
+                "Show the methods for this scene beside each other, with the reference and its standard error (M)";
             if MethodsState::applies_to(scene)
                 && ui.selectable_label(compares_methods, "Methods").on_hover_text(tip).clicked()
             {

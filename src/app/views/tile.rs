@@ -40,6 +40,8 @@ pub struct TileState {
     pub picked: Option<(Vec3, f32)>,
     /// Key of the parameter of the surface that the user is changing.
     pub changing: Option<&'static str>,
+    /// The display mode to restore after picking.
+    pub before_pick: Option<TileMode>,
     /// The view to restore after painting, which looks straight down.
     before_paint: Option<(f32, f32, f32, Vec2)>,
 }
@@ -74,6 +76,7 @@ impl Default for TileState {
             size: [0, 0],
             picked: None,
             changing: None,
+            before_pick: None,
             before_paint: None,
         }
     }
@@ -130,6 +133,11 @@ impl TileState {
     /// Drops what belongs to the old window, so that the new window loads it again.
     pub fn move_to(&mut self) {
         (self.texture, self.requested, self.inputs) = (None, None, None);
+    }
+
+    /// Drops the image, as of another tile.
+    pub fn forget(&mut self) {
+        (self.texture, self.rendered) = (None, None);
     }
 
     /// Turns paint mode on or off. Paint mode looks straight down.

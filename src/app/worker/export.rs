@@ -5,18 +5,24 @@ use std::sync::Arc;
 
 use crate::base::{Cancel, Error, Progress, Result, check_output};
 use crate::cache::Cache;
+use crate::export::slab::SlabFormat;
 use crate::export::tile::TileOptions;
 use crate::export::{ExportMeta, ExportOptions, ExportResolution, RadianceBasis};
 use crate::fit::Model;
 use crate::geometry::TileMesh;
 use crate::pipeline::{Outcome, Pipeline};
+use crate::render::RenderScene;
 use crate::render::image::tone_map::ToneMap;
+use crate::render::seen_through::SlabScene;
 use crate::render::tile_view::TileScene;
 use crate::scene::LoadedScene;
 use crate::{export, fit};
 
 use super::preview_renderer::{CloseUpTile, PreviewRenderer, RenderRequest, ShadedMaterial};
 use super::runner::JobContext;
+
+/// Samples along each side of a pixel of an exported image.
+const SAMPLES_PER_SIDE: usize = 3;
 
 /// A file to export.
 #[derive(Debug, Clone)]
@@ -98,14 +104,12 @@ fn export(job: &ExportJob, cache: &Cache, cancel: &Cancel, report: &(dyn Fn(Expo
     let mut pipeline = crate::gpu::pipeline();
     pipeline.set_cancel(cancel.clone());
     pipeline.set_cache(cache.clone());
-    let progress = |task: &'static str| {
-        move |fraction: f32| {
-            report(ExportResult::Progress(fraction, task));
-            !cancel.is_set()
-        }
-    };
+    let progress = |task| progress(task, cancel, report);
     if let ExportKind::Tile(options) = &job.kind {
         return tile(job, &pipeline.mesh(&job.loaded)?, options, &progress("Writing the tile"));
+    }
+    if job.loaded.scene.slab.is_some() {
+        return of_slab(job, &pipeline, cancel, report);
     }
     let outcome = pipeline.effective(&job.loaded)?;
     match job.kind {
@@ -131,6 +135,57 @@ fn export(job: &ExportJob, cache: &Cache, cancel: &Cancel, report: &(dyn Fn(Expo
     }
 }
 
+/// A progress function that names the current work.
+fn progress<'a>(
+    task: &'static str,
+    cancel: &'a Cancel,
+    report: &'a (dyn Fn(ExportResult) + Sync),
+) -> impl Fn(f32) -> bool + Sync + 'a {
+    move |fraction| {
+        report(ExportResult::Progress(fraction, task));
+        !cancel.is_set()
+    }
+}
+
+/// Exports the material or the image of a scene with a slab.
+fn of_slab(
+    job: &ExportJob,
+    pipeline: &Pipeline,
+    cancel: &Cancel,
+    report: &(dyn Fn(ExportResult) + Sync),
+) -> Result<String> {
+    let (loaded, path) = (&*job.loaded, &job.path);
+    let format = if matches!(job.kind, ExportKind::Table(_)) { Some(SlabFormat::of(path)?) } else { None };
+    if format == Some(SlabFormat::Mitsuba) {
+        export::mitsuba::check(loaded)?;
+    }
+    let outcome = pipeline.slab(loaded)?;
+    let wrote = format!("Wrote {}", path.display());
+    Ok(match (&job.kind, format) {
+        (ExportKind::Table(choice), Some(format)) => {
+            let options = ExportOptions { resolution: choice.resolution(path), radiance: choice.radiance };
+            let written =
+                format.write(&outcome.slab, loaded, &options, path, &progress("Tabulating", cancel, report))?;
+            if written.pairs > 0 { format!("{wrote}: {} pairs.", written.pairs) } else { format!("{wrote}.") }
+        }
+        (ExportKind::Image { size }, _) => {
+            report(ExportResult::Progress(0.3, "Rendering"));
+            let render_scene = RenderScene::with(pipeline, loaded)?;
+            let scene = SlabScene::with(pipeline, loaded, &outcome, &render_scene)?;
+            let rendered = scene.render(&render_scene, *size, SAMPLES_PER_SIDE, cancel)?;
+            rendered.image.write(path, &ToneMap::new(&render_scene.camera)?)?;
+            format!("{wrote}.")
+        }
+        _ => {
+            let fit = fit::fit_slab(&outcome.slab, &progress("Fitting", cancel, report))?;
+            let (write, name) = (if is_gltf(path) { fit::thin_gltf } else { fit::thin_materialx }, &loaded.name);
+            crate::base::replace_file(path, write(&fit, name).as_bytes())?;
+            let (percent, db) = (100.0 * fit.errors.rel_l2, fit.errors.psnr_db);
+            format!("{wrote}: a thin rough surface. The fit differs from the slab by {percent:.1} % (PSNR {db:.1} dB).")
+        }
+    })
+}
+
 /// Checks that the files of an export can be written and that they replace neither the scene nor a file that it names.
 fn check_places(job: &ExportJob) -> Result<()> {
     let outputs = match job.kind {
@@ -145,8 +200,8 @@ fn check_places(job: &ExportJob) -> Result<()> {
 fn fitted(job: &ExportJob, outcome: &Outcome, progress: &Progress<'_>) -> Result<String> {
     let model = *Model::ALL.last().ok_or_else(|| Error::failed("no model to fit"))?;
     let fit = fit::fit(&outcome.brdf, model, progress)?;
-    let is_gltf = job.path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gltf"));
-    let text = if is_gltf { fit::gltf(&fit, &job.loaded.name) } else { fit::materialx(&fit, &job.loaded.name) };
+    let text =
+        if is_gltf(&job.path) { fit::gltf(&fit, &job.loaded.name) } else { fit::materialx(&fit, &job.loaded.name) };
     crate::base::replace_file(&job.path, text.as_bytes())?;
     Ok(format!(
         "Wrote {}: {}. The fit differs from the material by {:.1} % (PSNR {:.1} dB); a table is more accurate.",
@@ -155,6 +210,10 @@ fn fitted(job: &ExportJob, outcome: &Outcome, progress: &Progress<'_>) -> Result
         100.0 * fit.errors.rel_l2,
         fit.errors.psnr_db
     ))
+}
+
+fn is_gltf(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gltf"))
 }
 
 fn tile(job: &ExportJob, mesh: &TileMesh, options: &TileOptions, progress: &Progress<'_>) -> Result<String> {
@@ -180,7 +239,7 @@ fn image(
         material: ShadedMaterial::Outcome(outcome),
         bounced: None,
         size,
-        samples_per_side: 3,
+        samples_per_side: SAMPLES_PER_SIDE,
         build_caches: true,
         backend,
     };
