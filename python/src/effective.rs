@@ -5,10 +5,11 @@ use std::sync::OnceLock;
 
 use biscale::base::{check_output, require_finite};
 use biscale::cli::export::Report;
-use biscale::cli::fit::{fit_model, fit_slab, slab_report};
+use biscale::cli::fit::{fit_model, slab_report};
 use biscale::export::slab::SlabFormat;
 use biscale::export::{self, DirectionSampler, ExportMeta, ExportOptions, ExportResolution, RadianceBasis};
 use biscale::fit::Model;
+use biscale::fit::fit_slab;
 use biscale::pipeline::{Outcome, Pipeline, SlabOutcome};
 use biscale::scene::LoadedScene;
 use biscale::{Cancel, InputError};
@@ -207,8 +208,10 @@ impl EffectiveBrdf {
         let outcome = self.opaque(wi.py(), "standard_error")?;
         let (pairs, broadcast) = arrays::pairs_of_vec3(wi, wo)?;
         let values = run(wi.py(), Access::Exclusive, progress, |job| {
-            let estimator = outcome.errors_unless(&job.cancel)?;
-            Ok(estimator.map_or_else(|| vec![Vec3::NAN; pairs.len()], |estimator| estimator.standard_errors(&pairs)))
+            Ok(match outcome.errors_unless(&job.cancel)? {
+                Some(estimator) => estimator.standard_errors(&pairs, &job.cancel)?,
+                None => vec![Vec3::NAN; pairs.len()],
+            })
         })?;
         broadcast.vectors(wi.py(), &values)
     }

@@ -1,5 +1,6 @@
 //! Calls into the library: without the interpreter's lock, on threads that survive a fork, and stopped by Ctrl-C.
 
+use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
@@ -9,6 +10,7 @@ use std::time::Duration;
 
 use biscale::Cancel;
 use biscale::base::threads;
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -129,17 +131,40 @@ pub fn run<T: Send>(
     }
 }
 
-fn wait_for_turn<'a>(engine: &'a Engine, job: &Job) -> PyResult<MutexGuard<'a, ()>> {
-    loop {
+thread_local! {
+    /// True on a thread that holds [`Engine::exclusive`].
+    static HAS_TURN: Cell<bool> = const { Cell::new(false) };
+}
+
+/// The turn of an exclusive call.
+struct Turn<'a> {
+    _guard: MutexGuard<'a, ()>,
+}
+
+impl Drop for Turn<'_> {
+    fn drop(&mut self) {
+        HAS_TURN.set(false);
+    }
+}
+
+/// Waits until other exclusive calls have ended. A progress function that asks for a turn would wait for its own caller.
+fn wait_for_turn<'a>(engine: &'a Engine, job: &Job) -> PyResult<Turn<'a>> {
+    if HAS_TURN.get() {
+        let text = "a progress function cannot start a computation: the one that calls it has not ended";
+        return Err(PyRuntimeError::new_err(text));
+    }
+    let guard = loop {
         match engine.exclusive.try_lock() {
-            Ok(guard) => return Ok(guard),
-            Err(TryLockError::Poisoned(poisoned)) => return Ok(poisoned.into_inner()),
+            Ok(guard) => break guard,
+            Err(TryLockError::Poisoned(poisoned)) => break poisoned.into_inner(),
             Err(TryLockError::WouldBlock) => {
                 std::thread::sleep(Duration::from_millis(1));
                 job.poll(None)?;
             }
         }
-    }
+    };
+    HAS_TURN.set(true);
+    Ok(Turn { _guard: guard })
 }
 
 fn wait_for<T>(receiver: &Receiver<T>, job: &Job, progress: Option<&Py<PyAny>>) -> PyResult<T> {

@@ -155,8 +155,7 @@ impl Scene {
     /// A key of everything that results depend on: the scene, the content of its files, the build of the package, and `more`.
     #[pyo3(signature = (more = None))]
     fn key(&self, py: Python<'_>, more: Option<&[u8]>) -> PyResult<String> {
-        let key = SceneBundle::of(&self.lock()).or_raise(py)?.key(more.unwrap_or_default());
-        Ok(key.bytes().iter().map(|byte| format!("{byte:02x}")).collect())
+        Ok(SceneBundle::of(&self.lock()).or_raise(py)?.key(more.unwrap_or_default()).name())
     }
 
     /// The keys of this scene: `key`, `unit`, `type`, `range`, `choices`, `default`, `doc` and `value` of each.

@@ -8,14 +8,26 @@ use toml::Value;
 
 use crate::errors::{self, OrRaise};
 
+/// Largest depth of lists and dictionaries in a value.
+const MAX_DEPTH: usize = 32;
+
 /// Converts a value of a scene's key. Arrays of numpy become lists.
 pub fn to_toml(key: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {
+    nested(key, value, MAX_DEPTH)
+}
+
+fn nested(key: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<Value> {
     let py = value.py();
+    let refused = |found: String, expected: &str| errors::input_error(py, &InputError::new(key, found, expected));
+    let Some(inner) = depth.checked_sub(1) else {
+        return Err(refused("a value that contains itself".to_owned(), "lists and dictionaries that end"));
+    };
     if value.is_instance_of::<PyBool>() {
         return Ok(Value::Boolean(value.is_truthy()?));
     }
     if value.is_instance_of::<PyInt>() {
-        return Ok(Value::Integer(value.extract()?));
+        let number = value.extract().map_err(|_| refused(value.to_string(), "a whole number of 64 bits"))?;
+        return Ok(Value::Integer(number));
     }
     if value.is_instance_of::<PyFloat>() {
         return Ok(Value::Float(value.extract()?));
@@ -26,7 +38,7 @@ pub fn to_toml(key: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {
     if let Ok(table) = value.cast::<PyDict>() {
         let entries = table.iter().map(|(name, value)| {
             let name: String = name.str()?.extract()?;
-            let value = to_toml(&name, &value)?;
+            let value = nested(&name, &value, inner)?;
             Ok((name, value))
         });
         return Ok(Value::Table(entries.collect::<PyResult<_>>()?));
@@ -37,14 +49,13 @@ pub fn to_toml(key: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {
     }
     // Numbers and arrays of numpy.
     if value.hasattr("tolist")? {
-        return to_toml(key, &value.call_method0("tolist")?);
+        return nested(key, &value.call_method0("tolist")?, inner);
     }
     if let Ok(entries) = value.try_iter() {
-        return Ok(Value::Array(entries.map(|entry| to_toml(key, &entry?)).collect::<PyResult<_>>()?));
+        return Ok(Value::Array(entries.map(|entry| nested(key, &entry?, inner)).collect::<PyResult<_>>()?));
     }
     let found = format!("a value of type `{}`", value.get_type().name()?);
-    let expected = "a number, a text, a list or a dictionary";
-    Err(errors::input_error(py, &InputError::new(key, found, expected)))
+    Err(refused(found, "a number, a text, a list or a dictionary"))
 }
 
 /// Converts a value of a scene to Python.

@@ -81,6 +81,12 @@ def test_a_progress_function_gets_the_part_and_can_cancel_or_raise():
         long_scene().effective(**LONG, progress=fail)
 
 
+def test_a_progress_function_that_computes_raises_instead_of_waiting_for_itself():
+    with pytest.raises(RuntimeError, match="cannot start a computation"):
+        long_scene().effective(**LONG, progress=lambda part: bs.Scene("default").effective(quality="draft"))
+    assert bs.Scene("default").effective(quality="draft").form
+
+
 @pytest.mark.skipif(os.name == "nt", reason="sends SIGINT")
 def test_ctrl_c_stops_a_computation():
     program = """

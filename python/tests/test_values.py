@@ -116,7 +116,7 @@ def test_the_table_is_that_of_the_command(cup, tmp_path):
 
 def test_a_result_describes_itself(cup):
     assert {"warnings", "surface"} <= set(cup.health)
-    assert cup.error["rel_l2"] > 0
+    assert cup.error["rel_l2"] > 0 and 0 <= cup.error["light_left_out"] < 0.35
     assert any(effect["name"] == "anisotropy" and effect["on"] for effect in cup.plan)
     assert all(ms >= 0 for ms in cup.times_ms.values()) and cup.form
     wi, wo = pairs(5)
