@@ -259,7 +259,7 @@ pub fn factorization(brdf: &EffectiveBrdf, factored: Option<Errors>, max_rank: u
             (true, factors.channels.iter().map(|channel| channel.ranks.1).collect(), step)
         }
         Representation::Wu2011(tables) => {
-            let ranks = tables.report.materials.iter().map(|material| material.n_rank).collect();
+            let ranks = tables.ranks();
             (true, ranks, (TAU / tables.direction_count().max(1) as f32).sqrt())
         }
         _ => {

@@ -103,7 +103,7 @@ pub fn gather(
     };
     let raw: Vec<Vec3> = (0..nodes * nodes).into_par_iter().map(at).collect();
     let noise = variance.sqrt() * scale;
-    Ok(InterreflectionTable::new(settings.grid, &raw, noise, transport.hit_fraction()))
+    Ok(InterreflectionTable::new(settings.grid, &raw, noise))
 }
 
 impl<'a> Reflector<'a> {

@@ -28,8 +28,6 @@ pub struct InterreflectionTable {
     /// A row for each `o`: planes of red, green and blue with the rings of `i`. The first [`REPEATED`] azimuths of a ring
     /// follow its last one.
     rows: Vec<f32>,
-    /// Fraction of all rays that hit an element.
-    pub hit_fraction: f64,
     /// Estimated relative L2 of the noise of the walks.
     pub noise: f64,
     /// Estimated relative L2 of the error of interpolation between nodes.
@@ -40,7 +38,7 @@ impl InterreflectionTable {
     /// Makes a table from `G` at all pairs of nodes, row by row. The two values of a swapped pair, which differ by
     /// noise, are averaged; `noise` is the root of the sum of the variances of all averages, weighted by
     /// [`NodeWeights::of_pair`].
-    pub(super) fn new(grid: ReducedGrid, raw: &[Vec3], noise: f64, hit_fraction: f64) -> Self {
+    pub(super) fn new(grid: ReducedGrid, raw: &[Vec3], noise: f64) -> Self {
         let n = grid.len();
         let mean = |row: usize, column: usize| 0.5 * (raw[row * n + column] + raw[column * n + row]).max(Vec3::ZERO);
         let values: Vec<Vec3> = (0..n * n).into_par_iter().map(|at| mean(at / n, at % n)).collect();
@@ -62,13 +60,13 @@ impl InterreflectionTable {
                 (0..3).for_each(|channel| row[channel * length / 3 + at] = value[channel]);
             }
         });
-        Self { grid, rows, hit_fraction, noise, interpolation }
+        Self { grid, rows, noise, interpolation }
     }
 
     /// An empty table with these errors.
     #[cfg(test)]
     pub fn with_errors(noise: f64, interpolation: f64) -> Self {
-        Self { grid: ReducedGrid::new(2), rows: Vec::new(), hit_fraction: 0.0, noise, interpolation }
+        Self { grid: ReducedGrid::new(2), rows: Vec::new(), noise, interpolation }
     }
 
     /// Estimated relative L2 of the error of `G_indirect`.
@@ -272,7 +270,7 @@ mod tests {
         let nodes = grid.directions();
         let pairs = nodes.iter().flat_map(|o| nodes.iter().map(move |i| (*i, *o)));
         let raw: Vec<Vec3> = pairs.map(|(i, o)| Vec3::splat(of(i, o))).collect();
-        InterreflectionTable::new(grid, &raw, 0.0, 1.0)
+        InterreflectionTable::new(grid, &raw, 0.0)
     }
 
     #[test]

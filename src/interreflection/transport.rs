@@ -120,11 +120,6 @@ impl Transport {
         cancel.check()?;
         Ok(Self { tracer, facets: chosen, rays })
     }
-
-    /// Fraction of all rays that hit an element.
-    pub fn hit_fraction(&self) -> f64 {
-        self.rays.iter().filter(|ray| ray.hit.is_some()).count() as f64 / self.rays.len().max(1) as f64
-    }
 }
 
 impl Tracer {

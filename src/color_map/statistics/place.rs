@@ -118,10 +118,6 @@ impl PlaceMap {
         &self.map
     }
 
-    pub fn is_ranked(&self) -> bool {
-        self.ranked
-    }
-
     /// Moments over the whole tile, in the unit of [`PlaceMap::map`].
     pub fn whole(&self) -> Normal {
         if self.ranked { Normal { mean: 0.0, deviation: 1.0 } } else { self.driver.mips().whole() }

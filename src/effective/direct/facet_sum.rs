@@ -43,8 +43,7 @@ impl FacetSum {
         sum
     }
 
-    /// Replaces the materials of the same facets; an edit of a BRDF or a colour needs nothing else.
-    pub fn set_materials(&mut self, facets: &Facets, material_of_slot: &[usize], materials: &[Material]) {
+    fn set_materials(&mut self, facets: &Facets, material_of_slot: &[usize], materials: &[Material]) {
         for group in &mut self.groups {
             let material = &materials[material_of_slot[usize::from(facets.slots[group.range.start])]];
             group.color = material.color;

@@ -12,33 +12,13 @@ use crate::effective::{MaterialFactors, VisibleFacets, Wu2011Settings};
 use crate::geometry::Facets;
 use crate::math::directions::ParaboloidMap;
 
-/// Sizes, ranks and times of one material, as in Table 3 of the paper.
-#[derive(Debug, Clone, PartialEq)]
-pub struct MaterialReport {
-    /// Index into the materials.
-    pub material: usize,
-    pub m_rows: usize,
-    pub m_columns: usize,
-    pub m_directions: usize,
-    /// Number of directions in the paper's sampling; it exceeds `m_directions` if the limit on the build time applies.
-    pub wanted_m_directions: usize,
-    pub m_rank: usize,
-    /// Fraction of the power of M that is kept, measured over all of M; the lowest of all colour directions.
-    pub m_kept: f64,
-    pub m_bytes: usize,
-    pub m_seconds: f64,
-    /// Number of normal bins that contain facets.
-    pub n_columns: usize,
-    pub n_rank: usize,
-    /// Fraction of the power of the projected N that is kept.
-    pub n_kept: f64,
-}
-
 /// `G` of the facets of one material.
 #[derive(Debug, Clone)]
 pub(super) struct MaterialTables {
     pub map: Arc<ParaboloidMap>,
     pub tables: Vec<NodePairTable>,
+    /// Rank of the projected N, the largest of all channels.
+    pub rank: usize,
 }
 
 /// The facet indices of each material.
@@ -58,7 +38,7 @@ impl MaterialTables {
         material: &Material,
         factors: &MaterialFactors,
         settings: &Wu2011Settings,
-    ) -> Result<(Self, MaterialReport)> {
+    ) -> Result<Self> {
         let (facets, directions) = (tile.facets, tile.directions);
         let visibility: Vec<f32> = (0..directions.len())
             .flat_map(|node| members.iter().map(move |&s| f32::from(u8::from(tile.visibility.is_visible(node, s)))))
@@ -69,31 +49,17 @@ impl MaterialTables {
         let shared = members.iter().all(|&s| facets.colors[s] == facets.colors[members[0]]);
         let masks = if shared { vec![facets.colors[members[0]].as_dvec3()] } else { DVec3::AXES.to_vec() };
         let mut tables = Vec::new();
-        let (mut n_rank, mut n_kept) = (0, 1.0_f64);
+        let mut rank = 0;
         for (c, mask) in masks.into_iter().enumerate() {
             let weight = |s: &usize| facets.areas[*s] * if shared { 1.0 } else { facets.colors[*s][c] };
             let weights: Vec<f32> = members.iter().map(weight).collect();
             let n = binned.factor(&weights, settings)?;
-            (n_rank, n_kept) = (n_rank.max(n.rank), n_kept.min(n.kept));
+            rank = rank.max(n.rank);
             for m in &factors.channels {
                 let values = product(&n, directions, &binned.bins, m, &factors.directions, tile.base_area);
                 tables.push(NodePairTable { values, tint: m.tint(material.color) * mask });
             }
         }
-        let report = MaterialReport {
-            material: 0,
-            m_rows: factors.rows(),
-            m_columns: factors.columns(),
-            m_directions: factors.directions.len(),
-            wanted_m_directions: factors.wanted_directions,
-            m_rank: factors.rank(),
-            m_kept: factors.channels.iter().map(|channel| channel.kept).fold(1.0, f64::min),
-            m_bytes: factors.bytes(),
-            m_seconds: factors.seconds,
-            n_columns: binned.bins.len(),
-            n_rank,
-            n_kept,
-        };
-        Ok((Self { map: Arc::clone(&factors.directions), tables }, report))
+        Ok(Self { map: Arc::clone(&factors.directions), tables, rank })
     }
 }

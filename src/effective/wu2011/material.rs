@@ -1,7 +1,6 @@
 //! Matrix M of rotated lobes, factored in streamed blocks; M itself is never stored (Wu et al. 2011, Sec. 3.5 and 3.7).
 
 use std::sync::Arc;
-use std::time::Instant;
 
 use glam::{DVec3, Vec3};
 use nalgebra::DMatrix;
@@ -27,10 +26,6 @@ pub struct MaterialFactors {
     pub(super) directions: Arc<ParaboloidMap>,
     pub(super) normals: ParaboloidSphere,
     pub(super) channels: Vec<ChannelFactors>,
-    /// Number of directions in the paper's sampling, before the limit on the build time.
-    pub wanted_directions: usize,
-    /// Build time [s].
-    pub seconds: f64,
 }
 
 /// M along one colour direction: `M_kj ≈ mean_j + Σ_c coefficients_kc vectors_jc`.
@@ -45,6 +40,7 @@ pub(super) struct ChannelFactors {
     pub coefficients: Vec<f32>,
     pub rank: usize,
     /// Fraction of the power of M - mean that is kept, measured over all of M.
+    #[cfg(test)]
     pub kept: f64,
 }
 
@@ -54,9 +50,7 @@ impl MaterialFactors {
     /// # Errors
     /// More coefficients than 2 GB, or a factorization that fails.
     pub fn new(material: &Material, settings: &Wu2011Settings) -> Result<Self> {
-        let started = Instant::now();
-        let wanted = Sampling::of(&material.brdf);
-        let mut sampling = wanted.capped(&material.brdf);
+        let mut sampling = Sampling::of(&material.brdf).capped(&material.brdf);
         if let Some(directions) = settings.m_directions {
             sampling.directions = directions;
         }
@@ -70,8 +64,7 @@ impl MaterialFactors {
                 ChannelFactors::of(&rows, settings)
             })
             .collect::<Result<Vec<_>>>()?;
-        let seconds = started.elapsed().as_secs_f64();
-        Ok(Self { directions, normals, channels, wanted_directions: wanted.directions, seconds })
+        Ok(Self { directions, normals, channels })
     }
 
     /// Number of rows of M, which are unordered direction pairs.
@@ -107,7 +100,6 @@ impl ChannelFactors {
             (projected[k * columns + j] - ones[k] * mean[j]) * d[j] / (l as f64).sqrt()
         });
         let power_with_mean: f64 = (0..columns).map(|j| second[j] * d[j] * d[j]).sum();
-        let power: f64 = (0..columns).map(|j| (second[j] - weight * mean[j] * mean[j]) * d[j] * d[j]).sum();
         let right = right_vectors(&q, settings.keep_m, power_with_mean)?;
         let rank = right.rank;
         let scaled = |divide: bool| -> Vec<f64> {
@@ -127,13 +119,25 @@ impl ChannelFactors {
             .into());
         }
         let coefficients = rows.coefficients(&scaled(false), &mean, rank);
-        let kept_power: f64 = coefficients
-            .chunks(rank.max(1))
-            .enumerate()
-            .map(|(row, c)| f64::from(rows.weight(row)) * c.iter().map(|&x| f64::from(x).powi(2)).sum::<f64>())
-            .sum();
-        let kept = if power > 1e-10 * power_with_mean { kept_power / power } else { 1.0 };
-        Ok(Self { color: rows.along, mean, vectors: scaled(true), coefficients, rank, kept })
+        #[cfg(test)]
+        let kept = {
+            let power: f64 = (0..columns).map(|j| (second[j] - weight * mean[j] * mean[j]) * d[j] * d[j]).sum();
+            let kept: f64 = coefficients
+                .chunks(rank.max(1))
+                .enumerate()
+                .map(|(row, c)| f64::from(rows.weight(row)) * c.iter().map(|&x| f64::from(x).powi(2)).sum::<f64>())
+                .sum();
+            kept / power
+        };
+        Ok(Self {
+            color: rows.along,
+            mean,
+            vectors: scaled(true),
+            coefficients,
+            rank,
+            #[cfg(test)]
+            kept,
+        })
     }
 
     /// The factor that turns a scalar value into a colour: the colour direction times the material's colour.

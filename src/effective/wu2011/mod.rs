@@ -19,7 +19,6 @@ mod tests;
 mod visible_normals;
 
 use std::sync::Arc;
-use std::time::Instant;
 
 use glam::{DVec3, Vec3};
 
@@ -29,7 +28,6 @@ use crate::brdf::Material;
 use crate::geometry::Facets;
 use crate::math::directions::{ParaboloidMap, Tap};
 use crate::visibility::PackedVisibility;
-pub use group::MaterialReport;
 pub use material::MaterialFactors;
 pub use settings::Wu2011Settings;
 
@@ -44,15 +42,6 @@ pub struct VisibleFacets<'a> {
     pub base_area: f64,
 }
 
-/// Sizes, ranks and times of a build.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Wu2011Report {
-    pub n_rows: usize,
-    pub materials: Vec<MaterialReport>,
-    /// Time of everything but M, which is precomputed [s].
-    pub product_seconds: f64,
-}
-
 /// The effective BRDF in the paper's representation.
 #[derive(Debug, Clone)]
 pub struct Wu2011 {
@@ -61,7 +50,6 @@ pub struct Wu2011 {
     /// `a_v / A` at the directions of visibility (Eq. 10).
     projected_area: Vec<f32>,
     base_area: f64,
-    pub report: Wu2011Report,
 }
 
 /// Number of unordered pairs of `count` items; also the row of M at which the pairs `(0..=count, count)` start.
@@ -118,7 +106,6 @@ impl Wu2011 {
         settings: &Wu2011Settings,
     ) -> Result<Self> {
         settings.check()?;
-        let started = Instant::now();
         let VisibleFacets { facets, visibility, directions, base_area } = *tile;
         if visibility.facet_count != facets.len() || visibility.direction_count != directions.len() {
             return Err(Error::failed("the visibility belongs to other facets or directions"));
@@ -126,7 +113,6 @@ impl Wu2011 {
         if !(base_area > 0.0 && base_area.is_finite()) {
             return Err(InputError::new("tile.size", base_area, "a tile with an area").into());
         }
-        let mut report = Wu2011Report { n_rows: rows_of(directions.len()), ..Default::default() };
         let mut groups = Vec::new();
         for (material, members) in group_facets(facets, material_of_slot, materials.len())?.iter().enumerate() {
             if members.is_empty() {
@@ -136,9 +122,7 @@ impl Wu2011 {
                 .get(material)
                 .and_then(Option::as_ref)
                 .ok_or_else(|| Error::failed("a material has no factors"))?;
-            let (group, row) = MaterialTables::new(tile, members, &materials[material], factors, settings)?;
-            report.materials.push(MaterialReport { material, ..row });
-            groups.push(group);
+            groups.push(MaterialTables::new(tile, members, &materials[material], factors, settings)?);
         }
         let projected_area = (0..directions.len())
             .map(|node| {
@@ -149,8 +133,7 @@ impl Wu2011 {
                 (sum / base_area) as f32
             })
             .collect();
-        report.product_seconds = started.elapsed().as_secs_f64();
-        Ok(Self { groups, directions: directions.clone(), projected_area, base_area, report })
+        Ok(Self { groups, directions: directions.clone(), projected_area, base_area })
     }
 
     /// Returns `a_v(o)` and writes `a_v f̄` of each light to `out`.
@@ -173,6 +156,11 @@ impl Wu2011 {
         }
         let relative: f32 = self.directions.taps(o).iter().map(|&(node, w)| w * self.projected_area[node]).sum();
         f64::from(relative) * self.base_area
+    }
+
+    /// Rank of the projected N of each material that facets carry.
+    pub fn ranks(&self) -> Vec<usize> {
+        self.groups.iter().map(|group| group.rank).collect()
     }
 
     /// Number of directions of visibility.

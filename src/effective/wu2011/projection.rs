@@ -30,8 +30,6 @@ pub(super) struct RightVectors {
     pub rank: usize,
     /// Orthonormal columns, row-major `columns of P x rank`.
     pub vectors: Vec<f64>,
-    /// Fraction of the power of Q that they keep.
-    pub kept: f64,
 }
 
 /// Computes the fewest right singular vectors of `q` (l rows) that keep the fraction `keep` of its power, from its
@@ -42,14 +40,13 @@ pub(super) fn right_vectors(q: &DMatrix<f64>, keep: f64, scale: f64) -> Result<R
         let floor = 1e-10 * scale.max(values.first().copied().unwrap_or(0.0));
         values.iter().take_while(|&&value| value > floor).count()
     };
-    let (values, right) = right_singular(q, |values| match significant(values) {
+    let (_, right) = right_singular(q, |values| match significant(values) {
         0 => 0,
         count => rank_for(&values[..count], keep),
     })?;
-    let (rank, total) = (right.ncols(), values.iter().sum::<f64>());
+    let rank = right.ncols();
     let vectors = right.transpose().as_slice().to_vec();
-    let kept = if total > 0.0 { values[..rank].iter().sum::<f64>() / total } else { 1.0 };
-    Ok(RightVectors { rank, vectors, kept })
+    Ok(RightVectors { rank, vectors })
 }
 
 #[cfg(test)]

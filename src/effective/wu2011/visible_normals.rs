@@ -36,8 +36,6 @@ pub(super) struct NormalFactors {
     /// `U_N` on all ordered pairs of directions: `[o][i][c]`.
     pub table: Vec<f32>,
     pub rank: usize,
-    /// Fraction of the power of the projected N - mean that is kept.
-    pub kept: f64,
 }
 
 /// Facets whose projections are computed together.
@@ -135,7 +133,7 @@ impl<'a> BinnedFacets<'a> {
             }
         }
         let vectors = right.vectors.iter().enumerate().map(|(k, v)| v / d[k / rank]).collect();
-        Ok(NormalFactors { mean, vectors, table, rank, kept: right.kept })
+        Ok(NormalFactors { mean, vectors, table, rank })
     }
 
     /// R times the rows' weights `√(Ω_i Ω_o)`, or `√(2 Ω_i Ω_o)` for pairs that represent two ordered pairs. Each of
