@@ -139,3 +139,13 @@ def test_a_change_runs_only_what_depends_on_it():
     scene["material.default.brdf.roughness"] = 0.3
     second = scene.effective(quality="draft", backend="cpu").times_ms
     assert "visibility" in first and "visibility" not in second
+
+
+def test_values_that_contain_themselves_and_numbers_beyond_64_bits_name_their_key():
+    scene = bs.Scene("default")
+    loop = []
+    loop.append(loop)
+    with pytest.raises(bs.InputError, match="contains itself"):
+        scene["tile.size"] = loop
+    with pytest.raises(bs.InputError, match="quality.seed.*64 bits"):
+        scene["quality.seed"] = 10**30
