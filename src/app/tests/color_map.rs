@@ -176,6 +176,8 @@ fn a_map_is_added_to_any_surface_and_removed_and_a_layer_has_a_driver_of_its_own
     let two = map(&mut harness);
     assert_eq!((two.layer.len(), two.layer[1].driver.kind(), two.layer[1].name.as_str()), (2, "noise", "layer 2"));
     assert!(editor(&mut harness).messages.texts().is_empty());
+    // Results that arrive later move the button.
+    settle(&mut harness);
     harness.get_all_by_label("Remove layer").last().unwrap().click();
     harness.run_steps(3);
     assert_eq!(map(&mut harness).layer.len(), 1);

@@ -183,6 +183,7 @@ fn picking_fills_the_lobe_view_and_ending_it_restores_the_tile() {
     let mut harness = harness(quick());
     settle(&mut harness);
     let ctx = harness.ctx.clone();
+    editor(&mut harness).tile.show = TileMode::Materials;
     editor(&mut harness).action(&ctx, Action::Pick);
     let center = harness.get_by_label("Object view").rect().center();
     harness.hover_at(center);
@@ -190,7 +191,38 @@ fn picking_fills_the_lobe_view_and_ending_it_restores_the_tile() {
     assert!(editor(&mut harness).lobe.viewer.is_some());
     assert!(editor(&mut harness).tile.show == TileMode::Contribution);
     editor(&mut harness).action(&ctx, Action::Pick);
-    assert!(editor(&mut harness).lobe.viewer.is_none() && editor(&mut harness).tile.show == TileMode::Clay);
+    assert!(editor(&mut harness).lobe.viewer.is_none() && editor(&mut harness).tile.show == TileMode::Materials);
+}
+
+#[test]
+fn dialogs_fit_into_a_small_window_with_a_large_interface() {
+    let mut harness = harness(quick());
+    let size = eframe::egui::vec2(1024.0, 700.0) / 1.8;
+    harness.set_size(size);
+    harness.run_steps(2);
+    let ctx = harness.ctx.clone();
+    let window = eframe::egui::Rect::from_min_size(eframe::egui::Pos2::ZERO, size);
+    for (action, labels) in
+        [(Action::ExportTable, ["Export the material", "Save"]), (Action::Vary, ["Vary the material", "Nine others"])]
+    {
+        editor(&mut harness).action(&ctx, action);
+        harness.run_steps(4);
+        for label in labels {
+            let rect = harness.get_by_label(label).rect();
+            assert!(window.contains_rect(rect), "{label}: {rect} in {window}");
+        }
+        editor(&mut harness).dialog = None;
+        harness.run_steps(2);
+    }
+}
+
+#[test]
+fn methods_are_compared_only_where_a_scene_has_some() {
+    let mut harness = harness(quick());
+    let ctx = harness.ctx.clone();
+    editor(&mut harness).action(&ctx, Action::Methods);
+    assert!(!editor(&mut harness).methods.on);
+    assert!(editor(&mut harness).messages.texts()[0].contains("a slab or a colour map"));
 }
 
 #[test]

@@ -9,6 +9,7 @@ use super::{editor, harness, quick, settle};
 use crate::app::document::Document;
 use crate::app::paint::Tool;
 use crate::app::views::brushes::{BrushRequest, PaintLayer};
+use crate::app::views::tile::TileMode;
 
 fn document(text: &str) -> Document {
     let scene = scene::parse(text).unwrap();
@@ -45,6 +46,7 @@ fn a_material_is_painted_on_any_surface_undone_to_the_start_and_redone_to_the_en
     editor.tile.set_painting(true);
     editor.tile.brush.tool = Tool::Material;
     editor.draw(&[Vec2::splat(0.3), Vec2::splat(0.6)]);
+    assert!(editor.tile.show == TileMode::Materials, "clay would hide the stroke");
     editor.tile.brush.slot = 2;
     editor.draw(&[Vec2::new(0.7, 0.2)]);
     editor.tile.brush.tool = Tool::Color;
