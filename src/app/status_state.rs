@@ -27,8 +27,8 @@ impl Editor {
         let is_failed = self.object.failed == Some(self.document.version());
         let is_pending = self.object.requested_at.is_some();
         if is_failed {
-            let text = "Shows the last image that could be computed: see the message";
-            ui.add(Label::new(text).truncate()).on_hover_text(text);
+            // A label that is cut off shows its text when the pointer is over it.
+            ui.add(Label::new("Shows the last image that could be computed: see the message").truncate());
         } else if !is_pending && preview.grade == Grade::Final {
             let (dot, _) = ui.allocate_exact_size(vec2(12.0, 12.0), egui::Sense::hover());
             ui.painter().circle_filled(dot.center(), 4.0, egui::Color32::from_rgb(96, 176, 96));
