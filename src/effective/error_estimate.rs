@@ -13,6 +13,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::pair_count::PairCount;
 use super::{Direct, FacetSum};
 use crate::base::{Cancel, Result};
 use crate::brdf::Material;
@@ -21,14 +22,6 @@ use crate::interreflection::InterreflectionTable;
 use crate::metrics::{Pair, mirror_biased_pairs};
 use crate::visibility::Resolution;
 
-/// Numbers of direction pairs that an estimate for a whole BRDF examines.
-pub(crate) const PAIRS: PairCount = PairCount { min: 200, min_effective: 16.0, max_for_errors: 800 };
-/// Those of an estimate on which refinement decides, which is quick.
-pub(crate) const FEW_PAIRS: PairCount = PairCount { max_for_errors: 0, ..PAIRS };
-/// Most pairs of an estimate.
-const MAX_PAIRS: usize = 6400;
-/// Seed of these pairs.
-pub(super) const PAIRS_SEED: u64 = 20_261_123;
 /// Pairs of nearly equal directions are rare, but hold most of the error of thin needles ([`Deviations::blended`]). They are
 /// therefore taken from a sequence that is longer by this factor, with a weight that is smaller by it.
 const RETROREFLECTION_FACTOR: usize = 8;
@@ -189,56 +182,6 @@ pub(super) fn f_bar_at(direct: &Direct, resolution: Resolution, Pair { i, o }: P
     direct.visibility.fill_at(resolution, o, &mut v_o);
     let area = direct.sum.projected_area(&v_o, o);
     if area > 0.0 { direct.sum.sum(i, o, &v_i, &v_o) / area } else { DVec3::ZERO }
-}
-
-/// Errors of visibility above this relative L2 are examined at more pairs until their effective number is this large: few grazing
-/// pairs may hold most of the error of a surface.
-const LEAST_ERROR: f64 = 0.01;
-const MIN_EFFECTIVE_ERRORS: f64 = 16.0;
-
-/// The sum of squares and the effective number of values, `(Σ|x|²)² / Σ|x|⁴`.
-fn spread(values: impl Iterator<Item = DVec3>) -> (f64, f64) {
-    let (mut norm, mut squares) = (0.0, 0.0);
-    for value in values.map(DVec3::length_squared) {
-        norm += value;
-        squares += value * value;
-    }
-    (norm, if squares > 0.0 { norm * norm / squares } else { 0.0 })
-}
-
-/// Number of direction pairs of an estimate. It is doubled while few pairs hold most of the sum of squares, such as those
-/// that see the bottom of deep grooves.
-pub(crate) struct PairCount {
-    pub min: usize,
-    /// Smallest effective number of the values of `f̄`.
-    pub min_effective: f64,
-    /// Most pairs that are examined because few hold most of the error.
-    pub max_for_errors: usize,
-}
-
-impl PairCount {
-    /// Evaluates `of` at enough pairs. `f_bar` and `error` return `f̄` of an evaluation and its error.
-    pub fn evaluate<T: Send>(
-        &self,
-        of: impl Fn(Pair) -> T + Sync,
-        f_bar: impl Fn(&T) -> DVec3,
-        error: impl Fn(&T) -> DVec3,
-    ) -> Vec<T> {
-        let mut all: Vec<T> = Vec::new();
-        let mut count = self.min;
-        loop {
-            let pairs = mirror_biased_pairs(count, PAIRS_SEED);
-            all.par_extend(pairs[all.len()..].par_iter().map(|&pair| of(pair)));
-            let (norm, effective) = spread(all.iter().map(&f_bar));
-            let (squared_error, effective_errors) = spread(all.iter().map(&error));
-            let is_small = squared_error <= LEAST_ERROR * LEAST_ERROR * norm;
-            let is_known = is_small || effective_errors >= MIN_EFFECTIVE_ERRORS || count >= self.max_for_errors;
-            if is_known && effective >= self.min_effective || count >= MAX_PAIRS {
-                return all;
-            }
-            count *= 2;
-        }
-    }
 }
 
 /// Sums of squares over the pairs of an estimate, and the largest value.
@@ -446,76 +389,5 @@ impl ErrorEstimator {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::metrics::compare;
-    use crate::pipeline::{Outcome, Pipeline};
-
-    fn outcome(scene: &str, settings: &[&str]) -> Outcome {
-        let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
-        Pipeline::new().effective(&crate::scene::open(scene, &settings).unwrap()).unwrap()
-    }
-
-    #[test]
-    fn the_stated_error_of_a_draft_is_near_its_difference_from_a_fine_result() {
-        // Few pairs hold most of the error of pyramids, so that 200 pairs show it badly. Of 2000 pairs on grooves, one along them,
-        // at 83°, may hold most of the error, which no estimate finds.
-        for (scene, azimuths, count) in
-            [("fig1d_yellow_sides", 24, 200), ("fig5d_pentagonal", 24, 2000), ("fig5d_pentagonal", 16, 2000)]
-        {
-            let pairs = mirror_biased_pairs(count, 5);
-            let values = |outcome: &Outcome| -> Vec<Vec3> {
-                pairs.par_iter().map(|pair| outcome.brdf.eval(pair.i, pair.o)).collect()
-            };
-            // The estimate is that of direct reflection.
-            let off = "effects.interreflection=off";
-            let draft = outcome(scene, &["quality.preset=draft", &format!("quality.azimuths={azimuths}"), off]);
-            let error = compare(&values(&draft), &values(&outcome(scene, &["quality.preset=fine", off]))).rel_l2;
-            let stated = draft.errors().unwrap().estimate().rel_l2;
-            assert!((error / 3.0..error * 3.0).contains(&stated), "{scene}, {azimuths} azimuths: {error} {stated}");
-            let errors = draft.errors().unwrap().standard_errors(&pairs, &Cancel::default()).unwrap();
-            let of_pairs = compare(&errors, &vec![Vec3::ZERO; pairs.len()]);
-            assert!(errors.iter().all(|error| error.is_finite() && error.min_element() >= 0.0), "{of_pairs:?}");
-        }
-    }
-
-    #[test]
-    fn fewer_facets_and_fewer_azimuths_state_larger_errors_of_their_kind() {
-        let stated = |setting: &str| {
-            outcome("fig5d_pentagonal", &["quality.preset=draft", setting]).errors().unwrap().estimate()
-        };
-        let (few, many) = (stated("quality.facets=256"), stated("quality.facets=16384"));
-        assert!(few.facets > 4.0 * many.facets, "{few:?} {many:?}");
-        let (few, many) = (stated("quality.azimuths=8"), stated("quality.azimuths=96"));
-        assert!(few.visibility > 4.0 * many.visibility, "{few:?} {many:?}");
-    }
-
-    #[test]
-    fn errors_that_few_grazing_pairs_hold_are_found() {
-        // Gaps between rows of pyramids are open only in narrow ranges of the azimuth.
-        let pyramids = r#"{ kind = "pyramids", height = 0.36684, base_size = 0.47016, truncation = 0.18758, face_ratio = 0.34018, spacing = 0.40953, sides = 5, arrangement = "square", rotation_deg = 9.56597 }"#;
-        let with = |azimuths: usize| {
-            let settings = [
-                format!("tile.geometry={pyramids}"),
-                "material.default.brdf={kind=\"blinn_phong\", exponent=12, specular=0.3}".to_owned(),
-                "effects.interreflection=off".to_owned(),
-                "quality.adaptive=false".to_owned(),
-                format!("quality.azimuths={azimuths}"),
-            ];
-            outcome("fig5d_pentagonal", &settings.iter().map(String::as_str).collect::<Vec<_>>())
-        };
-        let (coarse, fine) = (with(48), with(384));
-        let pairs = mirror_biased_pairs(2000, 77);
-        let values = |outcome: &Outcome| outcome.brdf.eval_pairs(&pairs, &Cancel::default()).unwrap();
-        let error = compare(&values(&coarse), &values(&fine)).rel_l2;
-        let stated = coarse.errors().unwrap().estimate().rel_l2;
-        println!("true {error:.4}, stated {stated:.4}");
-        assert!(error > 0.03 && (0.6..2.0).contains(&(stated / error)), "{error} {stated}");
-    }
-
-    #[test]
-    fn a_level_tile_states_no_error() {
-        let estimate = outcome("fig9b_cylinder_stripes", &[]).errors().unwrap().estimate();
-        assert_eq!((estimate.rel_l2, estimate.psnr_db), (0.0, None));
-    }
-}
+#[path = "error_estimate_tests.rs"]
+mod tests;

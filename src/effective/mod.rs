@@ -3,6 +3,7 @@
 pub mod direct;
 mod effective_brdf;
 mod error_estimate;
+mod pair_count;
 mod gpu_tile;
 pub mod low_rank;
 mod quick_estimate;
@@ -21,11 +22,12 @@ pub use direct::facet_sum::FacetSum;
 pub use direct::forced::mean_colors;
 pub use effective_brdf::{EffectiveBrdf, Representation};
 pub use error_estimate::{ErrorBound, ErrorEstimate, ErrorEstimator};
-pub(crate) use error_estimate::{FACETS_POWER, FEW_PAIRS, PAIRS, SAFETY_FACTOR, SECOND_SAMPLE_DIVISOR};
+pub(crate) use error_estimate::{FACETS_POWER, SAFETY_FACTOR, SECOND_SAMPLE_DIVISOR};
 pub use gpu_tile::{GpuTileInput, GpuVisibilityInput, HeightMarchInput, ShadowMapInput, SliceInput};
 pub use low_rank::bvndf::VisibilityRows;
 pub use low_rank::rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
 pub use low_rank::{ChannelTables, Factors, LowRank, LowRankSettings};
+pub(crate) use pair_count::{FEW_PAIRS, PAIRS};
 pub(crate) use quick_estimate::{PairValues, estimate_of_bounced, quick_estimate};
 
 pub use shading_table::content::TableContent;

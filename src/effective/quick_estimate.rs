@@ -3,7 +3,8 @@
 use glam::DVec3;
 
 use super::Direct;
-use super::error_estimate::{ErrorBound, ErrorEstimate, PAIRS, PAIRS_SEED, PairCount, SAFETY_FACTOR, Totals, f_bar_at};
+use super::error_estimate::{ErrorBound, ErrorEstimate, SAFETY_FACTOR, Totals, f_bar_at};
+use super::pair_count::{PAIRS, PAIRS_SEED, PairCount};
 use crate::geometry::Facets;
 use crate::interreflection::InterreflectionTable;
 use crate::metrics::{Pair, mirror_biased_pairs};

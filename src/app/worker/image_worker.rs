@@ -260,11 +260,11 @@ impl ImageWorker {
         let mut preview = self.render(job, ShadedMaterial::Outcome(&outcome), of_final, full, 2, context.cancel)?;
         preview.grade = Grade::Final;
         let all = fitting(job.size, MAX_PIXELS[usize::from(self.is_on_gpu())]);
-        if full != all {
+        if full[0] < all[0] {
             let ([width, height], [x, y]) = (full, all);
             preview.notes.push(format!(
                 "The image has {width} x {height} pixels in place of {x} x {y}, which would take longer than {:.0} s. An exported \
-                 image has all.",
+                 image is not reduced.",
                 FINAL_MS / 1000.0
             ));
         }
