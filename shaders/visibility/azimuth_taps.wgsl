@@ -36,6 +36,8 @@ fn visibility_taps(d: vec3f) -> VisibilityTaps {
 }
 
 // Soft visibility above the horizon between two slopes. Values outside of [0, 1] count as 0 and 1.
-fn between(taps: VisibilityTaps, slopes: vec2f) -> f32 {
+fn between(taps: VisibilityTaps, horizons: vec2f) -> f32 {
+    // Beside a horizon, the slope 0 keeps the interpolation to it exact. The CPU stores 0 there.
+    let slopes = select(horizons, max(horizons, vec2f(0.0)), max(horizons.x, horizons.y) > 0.0);
     return taps.base - taps.scales.x * slopes.x - taps.scales.y * slopes.y;
 }

@@ -15,6 +15,7 @@ use crate::effective::FacetSum;
 use crate::geometry::Facets;
 use crate::plan::{Costs, Plan, Refinement, SceneFeatures, Settings};
 use crate::scene::{LoadedScene, Switch};
+use crate::visibility::HorizonMap;
 
 /// The processor that computes visibility and product.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,6 +63,9 @@ impl Pipeline {
                 FacetsRole::Clusters
             }
         };
+        if tile.extruded {
+            settings.horizon_azimuths = HorizonMap::AZIMUTHS_OF_EXTRUDED;
+        }
         let materials = self.assignment(loaded, &tile, times)?;
         let facets = self.facets(&tile, &settings, role, times)?;
         let material_of_slot = grouped(&materials.material_of_slot, &facets, &settings);

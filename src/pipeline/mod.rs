@@ -43,7 +43,7 @@ pub use self::outcome::Outcome;
 use self::outcome::{ExaminedSum, limits};
 use self::refine::RefinedSum;
 pub use self::shading::ShadingBrdf;
-use self::shading::{LastShading, Shading, ShadingKeys};
+use self::shading::{RecentTables, Shading, ShadingKeys};
 pub use self::slab::{SlabOutcome, refuse_slab};
 pub use self::slab_values::{PHOTON_TARGET, SlabValues, require_faces};
 pub use self::stage::{Codec, Keyed, Stage, StageTimes};
@@ -71,7 +71,7 @@ pub struct Pipeline {
     env: Env,
     memo: Arc<Memo>,
     last_outcome: Arc<Mutex<Option<(Key, Outcome)>>>,
-    last_shading: Arc<Mutex<Option<LastShading>>>,
+    recent_tables: Arc<RecentTables>,
     /// The last settings and their key: most edits keep them.
     last_settings: Arc<Mutex<Option<(Settings, Key)>>>,
     disk: Cache,
@@ -310,8 +310,8 @@ impl Pipeline {
             plan.note_low_rank(is_low_rank, errors.rel_l2);
         }
         let brdf = Arc::new(brdf);
-        let last = (&self.last_shading, &self.disk);
-        let shading = Shading::new(brdf.clone(), &tile, &settings, plan.try_shading_table, keys, last);
+        let stored = (&self.recent_tables, &self.disk);
+        let shading = Shading::new(brdf.clone(), &tile, &settings, plan.try_shading_table, keys, stored);
         let health_inputs = HealthInputs {
             facets: facets.value.clone(),
             visibility: VisibilityInput::Soft(visibility.value),

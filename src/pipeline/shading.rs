@@ -1,6 +1,7 @@
 //! The representation that images read: a sum over a strided subset of the facets, a table, or f̄ itself. The first
 //! that is close enough is taken, when the first image asks.
 
+use std::collections::VecDeque;
 use std::ops::Range;
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
@@ -57,14 +58,36 @@ pub struct ShadingBrdf {
     pub was_cached: bool,
 }
 
-/// The last shading representation, which an edit of a colour can reuse.
-#[derive(Debug, Clone)]
-pub(super) struct LastShading {
-    /// The key of settings, facets and visibility.
-    surface: Key,
-    /// The key of the lobes of all materials and of their slots.
-    lobes: Key,
-    brdf: Arc<EffectiveBrdf>,
+/// The numbers of the tables that were computed last, by their keys, which colours do not enter. An edit of colours finds
+/// every table that it tries here.
+#[derive(Debug, Default)]
+pub(super) struct RecentTables(Mutex<VecDeque<(Key, TableContent)>>);
+
+impl RecentTables {
+    /// The largest sum of the sizes of older tables in bytes.
+    const MAX_BYTES: usize = 128 << 20;
+
+    fn get(&self, key: Key) -> Option<TableContent> {
+        let mut tables = lock(&self.0);
+        let found = tables.iter().position(|(known, _)| *known == key)?;
+        let entry = tables.remove(found)?;
+        tables.push_front(entry);
+        tables.front().map(|(_, content)| content.clone())
+    }
+
+    fn put(&self, key: Key, content: &TableContent) {
+        let mut tables = lock(&self.0);
+        tables.push_front((key, content.clone()));
+        let mut bytes = 0;
+        let kept = tables.iter().skip(1).take_while(|(_, content)| {
+            bytes += content.bytes();
+            bytes <= Self::MAX_BYTES
+        });
+        let kept = 1 + kept.count();
+        let dropped = tables.split_off(kept);
+        drop(tables);
+        drop(dropped);
+    }
 }
 
 /// Keys of the inputs of an effective BRDF.
@@ -90,7 +113,7 @@ pub(super) struct Shading {
     mirrored: Option<Arc<TileShape>>,
     tolerance: (f64, f64),
     seed: u64,
-    last: Arc<Mutex<Option<LastShading>>>,
+    recent: Arc<RecentTables>,
     disk: Cache,
     computed: Mutex<Option<ShadingBrdf>>,
 }
@@ -102,7 +125,7 @@ impl Shading {
         settings: &Settings,
         wants_table: bool,
         keys: ShadingKeys,
-        (last, disk): (&Arc<Mutex<Option<LastShading>>>, &Cache),
+        (recent, disk): (&Arc<RecentTables>, &Cache),
     ) -> Self {
         Self {
             exact,
@@ -112,7 +135,7 @@ impl Shading {
             interpolation: settings.interpolation,
             tolerance: settings.image_tolerance,
             seed: settings.seed,
-            last: last.clone(),
+            recent: recent.clone(),
             disk: disk.clone(),
             computed: Mutex::new(None),
         }
@@ -131,39 +154,49 @@ impl Shading {
         }
         let start = Instant::now();
         let mut times = StageTimes::new();
-        let Found { brdf, errors, direct_only } = self.first_close_enough(cancel, &mut times)?;
+        let (brdf, errors) = self.first_close_enough(cancel, &mut times)?;
         let was_cached = !times.is_empty() && times.iter().all(|(name, _)| *name == Tabulate::CACHED);
         let shading = ShadingBrdf { brdf, errors, ms: elapsed_ms(start), was_cached };
         *computed = Some(shading.clone());
-        *lock(&self.last) = Some(LastShading { surface: self.keys.surface, lobes: self.keys.lobes, brdf: direct_only });
         Ok(shading)
     }
 
     /// Walks the strategies from the cheapest: a strided subset of the facets, a table, f̄ itself.
-    fn first_close_enough(&self, cancel: &Cancel, times: &mut StageTimes) -> Result<Found> {
+    fn first_close_enough(
+        &self,
+        cancel: &Cancel,
+        times: &mut StageTimes,
+    ) -> Result<(Arc<EffectiveBrdf>, Option<Errors>)> {
         if self.grids.is_empty() {
-            return Ok(Found::new(self.exact.clone(), None));
+            return Ok((self.exact.clone(), None));
         }
         let mut check = Check::new(&self.exact, self.seed);
-        let (reused, has_failed) = self.reuse();
         if let Some((brdf, errors)) = self.strided_subset(&check) {
-            return Ok(Found::new(Arc::new(brdf), Some(errors)));
+            return Ok((Arc::new(brdf), Some(errors)));
         }
-        if has_failed {
-            return Ok(Found::new(self.exact.clone(), None));
-        }
-        match self.table(reused, &mut check, cancel, times)? {
-            (Some(table), errors) => self.with_bounced_columns(Found::new(Arc::new(table), errors), &mut check, cancel),
-            (None, errors) => Ok(Found::new(self.exact.clone(), errors)),
-        }
+        Ok(match self.table(&mut check, cancel, times)? {
+            (Some((table, errors)), _) => {
+                let (brdf, errors) = self.with_bounced_columns(table, errors, &mut check, cancel)?;
+                (Arc::new(brdf), Some(errors))
+            }
+            (None, errors) => (self.exact.clone(), errors),
+        })
     }
 
     /// Adds the light that facets send to each other to a table, so that images read one table and a GPU can read it.
     /// The table stays as it is if its error with this light exceeds the bound.
-    fn with_bounced_columns(&self, found: Found, check: &mut Check, cancel: &Cancel) -> Result<Found> {
-        let Representation::Interreflecting(direct, bounced) = &found.brdf.representation else { return Ok(found) };
-        let Representation::Table(table) = &**direct else { return Ok(found) };
-        let base_area = found.brdf.base_area;
+    fn with_bounced_columns(
+        &self,
+        found: EffectiveBrdf,
+        errors: Errors,
+        check: &mut Check,
+        cancel: &Cancel,
+    ) -> Result<(EffectiveBrdf, Errors)> {
+        let Representation::Interreflecting(direct, bounced) = &found.representation else {
+            return Ok((found, errors));
+        };
+        let Representation::Table(table) = &**direct else { return Ok((found, errors)) };
+        let base_area = found.base_area;
         let sum = |i: Vec3, o: Vec3| {
             let mut sum = DVec3::ZERO;
             bounced.eval_lights(&[i], o, |_, g| sum = g * base_area);
@@ -171,11 +204,8 @@ impl Shading {
         };
         let representation = Representation::Table(table.plus_bounced(sum, cancel)?);
         let brdf = EffectiveBrdf { representation, base_area };
-        let errors = self.decided_errors(&brdf, check, cancel)?;
-        if !self.is_close(errors) {
-            return Ok(found);
-        }
-        Ok(Found { brdf: Arc::new(brdf), errors: Some(errors), direct_only: found.brdf })
+        let with_bounced = self.decided_errors(&brdf, check, cancel)?;
+        Ok(if self.is_close(with_bounced) { (brdf, with_bounced) } else { (found, errors) })
     }
 
     /// A sum over a strided subset of the facets, if it is close enough.
@@ -188,31 +218,22 @@ impl Shading {
         })
     }
 
-    /// The coarsest table that is close enough, and the errors of the last one that was tried.
+    /// The coarsest table that is close enough and its errors, or the errors of the last one that was tried.
+    #[expect(clippy::type_complexity, reason = "a table with its errors, or errors alone")]
     fn table(
         &self,
-        reused: Option<ShadingTable>,
         check: &mut Check,
         cancel: &Cancel,
         times: &mut StageTimes,
-    ) -> Result<(Option<EffectiveBrdf>, Option<Errors>)> {
+    ) -> Result<(Option<(EffectiveBrdf, Errors)>, Option<Errors>)> {
         let mut last = None;
-        let known = reused.as_ref().map(|table| table.grid);
-        let first = self.grids.iter().position(|grid| Some(*grid) == known).unwrap_or(0);
-        if let Some(table) = reused {
-            let brdf = self.with_table(table);
-            let errors = self.decided_errors(&brdf, check, cancel)?;
-            if self.is_close(errors) {
-                return Ok((Some(brdf), Some(errors)));
-            }
-        }
-        for grid in &self.grids[first..] {
+        for grid in &self.grids {
             let errors = match self.attempt(*grid, check, cancel, times)? {
                 Attempt::Table(table) => {
                     let brdf = self.with_table(table);
                     let errors = self.decided_errors(&brdf, check, cancel)?;
                     if self.is_close(errors) {
-                        return Ok((Some(brdf), Some(errors)));
+                        return Ok((Some((brdf, errors)), None));
                     }
                     errors
                 }
@@ -323,7 +344,17 @@ impl Shading {
                 }
                 let stage = Tabulate { direct, nodes, keys: self.keys };
                 let env = Env::with_cancel(cancel.clone());
-                let content = run_without_memo(&stage, &env, &self.disk, times)?;
+                let mut key = KeyBuilder::of_stage(Tabulate::NAME);
+                stage.hash_into(&mut key);
+                let key = key.finish();
+                let content = match self.recent.get(key) {
+                    Some(content) => content,
+                    None => {
+                        let content = run_without_memo(&stage, &env, &self.disk, times)?;
+                        self.recent.put(key, &content);
+                        content
+                    }
+                };
                 Ok(ShadingTable::from_content(direct, nodes.grid, content))
             }
             representation => {
@@ -332,35 +363,6 @@ impl Shading {
                 ShadingTable::resample(sums, nodes, cancel).map(Some)
             }
         }
-    }
-
-    /// The last table, if it serves this BRDF; and whether no table was close enough for the same lobes.
-    fn reuse(&self) -> (Option<ShadingTable>, bool) {
-        let Some(last) = lock(&self.last).clone().filter(|last| last.surface == self.keys.surface) else {
-            return (None, false);
-        };
-        let same_lobes = last.lobes == self.keys.lobes;
-        match (last.brdf.direct_representation(), self.exact.direct_representation()) {
-            (Representation::Table(table), Representation::Direct(direct)) => {
-                (table.reused(&direct.sum, same_lobes), false)
-            }
-            (Representation::Table(_), _) => (None, false),
-            _ => (None, same_lobes),
-        }
-    }
-}
-
-/// The form of f̄ that images read.
-struct Found {
-    brdf: Arc<EffectiveBrdf>,
-    errors: Option<Errors>,
-    /// The same without columns of light that facets send to each other, for edits of colours.
-    direct_only: Arc<EffectiveBrdf>,
-}
-
-impl Found {
-    fn new(brdf: Arc<EffectiveBrdf>, errors: Option<Errors>) -> Self {
-        Self { direct_only: brdf.clone(), brdf, errors }
     }
 }
 

@@ -43,8 +43,8 @@ impl Pipeline {
         let names = material_names(scene, &tile.mesh, &materials)?;
         let keys =
             ShadingKeys { surface: facets.key, lobes: materials.key, facets: facets.key, visibility: facets.key };
-        let last = (&self.last_shading, &self.disk);
-        let shading = Shading::new(brdf.clone(), &tile, &settings, false, keys, last);
+        let stored = (&self.recent_tables, &self.disk);
+        let shading = Shading::new(brdf.clone(), &tile, &settings, false, keys, stored);
         let health_inputs = HealthInputs {
             facets: facets.value.clone(),
             visibility: VisibilityInput::Packed(Arc::new(visibility)),

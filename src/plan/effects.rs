@@ -181,20 +181,18 @@ fn visibility(context: &Context<'_>, switch: Switch) -> Decision {
         VisibilityMethod::Auto => "surfaces overhang",
         _ => "asked for by quality.visibility",
     };
+    let of_map = format!(
+        "{}: a horizon map of {azimuths} azimuths",
+        if features.extruded { "no overhangs, and no change along one axis" } else { "no overhangs" },
+    );
     let (reason, predicted_ms) = match algorithm {
         VisibilityAlgorithm::None => (no_visibility(context, switch), 0.0),
         VisibilityAlgorithm::HeightMarch => (
-            format!(
-                "height field: a horizon map of {} azimuths from a walk over its samples",
-                settings.horizon_azimuths
-            ),
+            format!("{of_map} from a walk over the samples of a height field"),
             facets * azimuths * costs.march_ns * 1e-6 / costs.threads,
         ),
         VisibilityAlgorithm::HorizonScan => (
-            format!(
-                "no overhangs: a horizon map of {} azimuths from slices through {} triangles",
-                settings.horizon_azimuths, features.triangles
-            ),
+            format!("{of_map} from slices through {} triangles", features.triangles),
             facets * azimuths * costs.scan_ns * 1e-6 / costs.threads,
         ),
         VisibilityAlgorithm::OcclusionIntervals => (

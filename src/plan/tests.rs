@@ -123,6 +123,7 @@ fn features() -> SceneFeatures {
         mirrors: None,
         height_samples: false,
         height_field: true,
+        extruded: false,
         closes_plane: true,
         maps_on_gpu: false,
         triangles: 64,

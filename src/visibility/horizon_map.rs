@@ -29,10 +29,13 @@ pub struct HorizonMap {
     pub(super) azimuths: usize,
     pub(super) facets: usize,
     pub(crate) transition_width: f32,
-    /// Slopes by `[azimuth][facet]`: [`HorizonMap::FREE`] if nothing blocks, [`HorizonMap::BLOCKED`] if all is blocked.
+    /// Slopes by `[azimuth][facet]`: [`HorizonMap::FREE`] or 0 if nothing blocks, [`HorizonMap::BLOCKED`] if all is
+    /// blocked.
     pub(super) slopes: Vec<f32>,
     /// Number of truncated walks.
     pub(super) truncated: usize,
+    /// True if the interpolation between the azimuths is exact.
+    pub(super) is_exact_between: bool,
     weights: SineWeights,
 }
 
@@ -66,11 +69,14 @@ fn sine(x: f32) -> f32 {
 }
 
 impl HorizonMap {
-    /// A slope so low that the transition stays below elevation 0 for the widest transition, by more than rounding:
-    /// tan(-0.02).
+    /// The slope of a facet that nothing blocks, along this azimuth and its neighbours. It is so low that the transition
+    /// stays below elevation 0 for the widest transition, by more than rounding: tan(-0.02).
     const FREE: f32 = -0.020_002_667;
     /// A slope so high that the transition never reaches the zenith. It is finite, so that its product with 0 is 0.
     pub(super) const BLOCKED: f32 = 1e9;
+    /// Azimuths that determine all others on a surface that does not change along x or along y. Its horizon at an angle φ to
+    /// the plane across the grooves has `cos φ` times the slope of that across them, which the interpolation follows exactly.
+    pub(crate) const AZIMUTHS_OF_EXTRUDED: usize = 4;
     /// Smallest cosine of an elevation. Times [`HorizonMap::BLOCKED`] it is far above 1, so that blocked facets are
     /// blocked at the zenith.
     const MIN_COSINE: f32 = 1e-6;
@@ -134,16 +140,36 @@ impl HorizonMap {
     }
 
     /// Takes slopes of the horizons in `[0, ∞]`, by `[azimuth][facet]`.
-    pub(super) fn from_slopes(facets: usize, azimuths: usize, transition_width: f32, mut slopes: Vec<f32>) -> Self {
-        slopes.par_iter_mut().with_min_len(1 << 16).for_each(|slope| {
-            *slope = if *slope <= 0.0 { Self::FREE } else { slope.min(Self::BLOCKED) };
+    pub(super) fn from_slopes(facets: usize, azimuths: usize, transition_width: f32, slopes: Vec<f32>) -> Self {
+        let row = |azimuth: usize| &slopes[azimuth % azimuths * facets..][..facets];
+        let mut stored = vec![0.0; slopes.len()];
+        stored.par_chunks_mut(facets.max(1)).enumerate().for_each(|(azimuth, stored)| {
+            let (before, own, after) = (row(azimuth + azimuths - 1), row(azimuth), row(azimuth + 1));
+            for (stored, ((&before, &own), &after)) in stored.iter_mut().zip(before.iter().zip(own).zip(after)) {
+                // Beside a horizon, the slope 0 keeps the interpolation to it exact.
+                let least = if before.max(after) > 0.0 { 0.0 } else { Self::FREE };
+                *stored = if own <= 0.0 { least } else { own.min(Self::BLOCKED) };
+            }
         });
-        Self::stored([azimuths, facets, 0], Self::clamped_width(transition_width), slopes)
+        let slopes = stored;
+        Self::stored([azimuths, facets, 0], false, Self::clamped_width(transition_width), slopes)
     }
 
     /// The map of stored slopes, from the numbers of azimuths, facets and truncated walks.
-    pub(super) fn stored([azimuths, facets, truncated]: [usize; 3], transition_width: f32, slopes: Vec<f32>) -> Self {
-        Self { azimuths, facets, transition_width, slopes, truncated, weights: SineWeights::new(azimuths) }
+    pub(super) fn stored(
+        [azimuths, facets, truncated]: [usize; 3],
+        is_exact_between: bool,
+        transition_width: f32,
+        slopes: Vec<f32>,
+    ) -> Self {
+        let weights = SineWeights::new(azimuths);
+        Self { azimuths, facets, transition_width, slopes, truncated, is_exact_between, weights }
+    }
+
+    /// States that the facets lie on a surface that does not change along x or along y, so that the interpolation between
+    /// [`HorizonMap::AZIMUTHS_OF_EXTRUDED`] azimuths is exact.
+    pub(crate) fn of_extruded(self) -> Self {
+        Self { is_exact_between: self.azimuths == Self::AZIMUTHS_OF_EXTRUDED, ..self }
     }
 
     /// Clamps a width of the transition [rad] to the range that a horizon map supports.

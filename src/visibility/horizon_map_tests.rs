@@ -27,6 +27,32 @@ fn the_slope_of_a_straight_wall_is_exact_between_azimuths() {
 }
 
 #[test]
+fn the_slope_in_a_groove_is_exact_at_all_azimuths() {
+    // Facets of a groove along y: in the middle, at a wall that rises towards -x, and on top.
+    let sides = [[1.5_f32, 0.8], [0.0, 3.0], [0.0, 0.0]];
+    for azimuths in [4, 8, 48] {
+        let wall = |[right, left]: [f32; 2], azimuth: f32| {
+            let across = azimuth.cos();
+            if across.abs() < 1e-6 { 0.0 } else { (across * right).max(-across * left) }
+        };
+        let nodes = (0..azimuths).map(|node| TAU * node as f32 / azimuths as f32);
+        let slopes = nodes.flat_map(|node| sides.map(|sides| wall(sides, node))).collect();
+        let map = HorizonMap::from_slopes(sides.len(), azimuths, 1e-4, slopes);
+        for direction in directions() {
+            let mut visibility = [f32::NAN; 3];
+            map.fill(direction, 0..3, &mut visibility);
+            let slope = direction.z / direction.truncate().length();
+            for (visible, sides) in visibility.into_iter().zip(sides) {
+                let above = slope - wall(sides, direction.y.atan2(direction.x));
+                if above.abs() * direction.truncate().length() > 1e-4 && direction.z > 1e-4 {
+                    assert_eq!(visible, f32::from(above > 0.0), "{azimuths} azimuths, {sides:?}, {direction}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn free_facets_are_visible_and_blocked_facets_are_not_from_the_horizon_to_the_zenith() {
     for azimuths in [1, 3, 4, 5, 48] {
         for width in [0.0, 1e-4, 0.02, 1.0] {

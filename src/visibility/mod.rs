@@ -94,12 +94,13 @@ impl Visibility {
         }
     }
 
-    /// Returns true if visibility can be read from every `step`-th azimuth; false for bit maps, and if nothing blocks.
+    /// Returns true if visibility can be read from every `step`-th azimuth; false for bit maps, and if no azimuth can be
+    /// missed.
     pub(crate) fn has_azimuth_step(&self, step: usize) -> bool {
         match self {
             Self::Unblocked { .. } | Self::Maps(_) => false,
             Self::HorizonMap(map) | Self::OcclusionIntervals(OcclusionIntervals { horizon_map: map, .. }) => {
-                map.azimuths().is_multiple_of(step)
+                map.azimuths().is_multiple_of(step) && !map.is_exact_between
             }
         }
     }

@@ -78,14 +78,16 @@ impl Stored for Visibility {
 
 fn write_horizon_map(horizon_map: &HorizonMap, out: &mut Writer) {
     [horizon_map.azimuths, horizon_map.facets, horizon_map.truncated].into_iter().for_each(|count| out.count(count));
+    out.count(usize::from(horizon_map.is_exact_between));
     out.numbers(&[horizon_map.transition_width]);
     out.numbers(&horizon_map.slopes);
 }
 
 fn read_horizon_map(from: &mut Reader<'_>) -> Option<HorizonMap> {
     let [azimuths, facets, truncated] = [from.count()?, from.count()?, from.count()?];
+    let is_exact_between = from.count()? == 1;
     let transition_width = from.numbers()?.first().copied()?;
     let slopes: Vec<f32> = from.numbers()?;
     let fits = azimuths > 0 && azimuths.checked_mul(facets)? == slopes.len();
-    fits.then(|| HorizonMap::stored([azimuths, facets, truncated], transition_width, slopes))
+    fits.then(|| HorizonMap::stored([azimuths, facets, truncated], is_exact_between, transition_width, slopes))
 }

@@ -161,6 +161,32 @@ brdf = { kind = "lambertian", albedo = 1.0 }"#;
     }
 }
 
+/// The horizon of a groove's wall falls to 0 along the groove, so that a small error of it decides what is seen at grazing
+/// angles.
+#[test]
+fn light_that_grazes_along_grooves_has_the_reflection_of_its_closed_form() {
+    let materials = r#"{ kind = "lambertian", albedo = 0.0 }
+[[material]]
+name = "bottom"
+brdf = { kind = "lambertian", albedo = 1.0 }"#;
+    let grooves = Grooves { across: Vec2::X, bottom: 0.5, depth: 1.0 };
+    let mut rng = ChaCha8Rng::seed_from_u64(6);
+    let mut along = |turn: f32| {
+        let [elevation, azimuth] = [(); 2].map(|()| rng.random::<f32>());
+        from_angles((70.0 + 15.0 * elevation).to_radians(), turn + (20.0 * azimuth - 10.0).to_radians())
+    };
+    let pairs: Vec<Pair> = (0..500).map(|_| Pair { i: along(0.25 * TAU), o: along(0.75 * TAU) }).collect();
+    let exact: Vec<Vec3> = pairs.iter().map(|pair| Vec3::splat(grooves.reflection(pair))).collect();
+    for preset in ["draft", "standard"] {
+        let geometry = r#"{ kind = "grooves", profile = "rectangular", count = 4, bottom_width = 0.5, depth = 0.25 }"#;
+        let outcome = Pipeline::new().effective(&open(geometry, materials, preset)).unwrap();
+        let errors = compare(&evaluate(&outcome.brdf, &pairs), &exact);
+        eprintln!("{preset}: {errors:?}");
+        assert!(errors.rel_l2 < 0.03, "{preset}: {errors:?}");
+        assert_eq!(outcome.settings.horizon_azimuths, 4, "{preset}: others follow from these");
+    }
+}
+
 /// The horizon of a thin hair is that of single far hairs, which differ from azimuth to azimuth. `a_v = A cos θ`, because the
 /// surface closes the plane.
 #[test]

@@ -51,11 +51,17 @@ impl ShadingTable {
             interpolation: Interpolation::Cubic,
             bounced_weights: Vec::new(),
             weights,
-            is_of_sum: true,
             vec4s,
             values: content.values,
             areas: Arc::new((areas, content.areas)),
         })
+    }
+}
+
+impl TableContent {
+    /// The size in bytes.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&**self.values) + size_of_val(&*self.areas)
     }
 }
 

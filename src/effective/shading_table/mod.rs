@@ -34,8 +34,6 @@ pub struct ShadingTable {
     weights: Vec<Weight>,
     /// As `weights`, but 0 for all columns except those of [`ShadingTable::plus_bounced`]; empty without these.
     bounced_weights: Vec<Weight>,
-    /// True if the columns are those of a sum over facets, false if they are the colours of another representation.
-    is_of_sum: bool,
     /// Groups of four columns per node.
     vec4s: usize,
     /// `[θ_h][φ_h][φ_d][θ_d][vec4]`, with one more node of θ_d at either end than the grid has, so that a cubic has
@@ -120,7 +118,7 @@ impl ShadingTable {
         let (nodes, facets) = (Nodes { mirrors, ..nodes }, nodes.facets);
         let area = |o: Vec3| direct.sums(&[], o, |_, _| {});
         let sampled = |h: Vec3| facets.and_then(|count| direct.sampled_about(h, count));
-        let table = Self::tabulate(nodes, weights, true, area, cancel, sampled, |sampled, i, o, sums| {
+        let table = Self::tabulate(nodes, weights, area, cancel, sampled, |sampled, i, o, sums| {
             let direct = sampled.as_ref().unwrap_or(direct);
             let pair = PairVectors::new(i, o);
             direct.with_visibility(i, o, |v_i, v_o| {
@@ -144,7 +142,6 @@ impl ShadingTable {
         Self::tabulate(
             nodes,
             weights,
-            false,
             area,
             cancel,
             |_| (),
@@ -161,7 +158,6 @@ impl ShadingTable {
     fn tabulate<P>(
         Nodes { grid, mirrors, read_by, known, .. }: Nodes,
         weights: Vec<Weight>,
-        is_of_sum: bool,
         area: impl Fn(Vec3) -> f64 + Sync,
         cancel: &Cancel,
         prepare: impl Fn(Vec3) -> P + Sync,
@@ -237,22 +233,10 @@ impl ShadingTable {
             interpolation: Interpolation::Cubic,
             bounced_weights: Vec::new(),
             weights,
-            is_of_sum,
             vec4s,
             values: Arc::new(values),
             areas: Arc::new((directions, areas)),
         })
-    }
-
-    /// The table for another sum over the same facets with the same visibility. If `same_lobes` is false, the lobes of
-    /// the two sums may differ. `None` if the table's values do not fit the other sum.
-    pub fn reused(&self, sum: &FacetSum, same_lobes: bool) -> Option<Self> {
-        let weights: Vec<Weight> = Column::of(sum)?.iter().map(|column| column.weight(sum)).collect();
-        let areas_only = |weights: &[Weight]| weights.iter().all(Weight::is_lobe);
-        let fits = self.is_of_sum
-            && weights.len() == self.weights.len()
-            && (same_lobes || areas_only(&weights) && areas_only(&self.weights));
-        fits.then(|| Self { weights, ..self.clone() })
     }
 
     /// The table with light that facets send to each other in three more columns. `g(i, o)` is `a_v f̄` of this light.

@@ -28,6 +28,8 @@ pub struct TileShape {
     pub flat: bool,
     /// Nothing overhangs.
     pub height_field: bool,
+    /// Nothing overhangs, and the surface is the same everywhere along x or along y, like grooves.
+    pub extruded: bool,
     /// The largest angle between a surface normal and z [rad].
     pub steepest: f32,
     /// The colours decide where facets are, because the image has rare bright texels.
@@ -121,10 +123,20 @@ impl Stage for BuildTile<'_> {
         let flat = high - low <= 1e-7 * mesh.size.max_element();
         let is_of_file = matches!(scene.tile.geometry, Geometry::Mesh(_));
         let height_field = mesh.is_height_field() || !is_of_file && mesh.closes_plane && nothing_faces_down(&mesh);
+        let extruded = !flat && height_field && mesh.closes_plane && is_same_along_an_axis(&mesh);
         let steepest = steepest(&mesh);
         let colors_place_facets = colors_place_facets(&mesh);
         let below = None;
-        Ok(TileShape { mesh, below, surface: self.surface, flat, height_field, steepest, colors_place_facets })
+        Ok(TileShape {
+            mesh,
+            below,
+            surface: self.surface,
+            flat,
+            height_field,
+            extruded,
+            steepest,
+            colors_place_facets,
+        })
     }
 }
 
@@ -133,6 +145,13 @@ impl Stage for BuildTile<'_> {
 /// hang above others, and light passes below it.
 fn nothing_faces_down(mesh: &TileMesh) -> bool {
     (0..mesh.triangles.len()).all(|triangle| mesh.geometric_normal(triangle).z > -1e-6)
+}
+
+/// Returns true if a closed surface does not change along x, or not along y.
+fn is_same_along_an_axis(mesh: &TileMesh) -> bool {
+    let is_same =
+        |axis: Vec3| (0..mesh.triangles.len()).all(|triangle| mesh.geometric_normal(triangle).dot(axis).abs() <= 1e-6);
+    is_same(Vec3::X) || is_same(Vec3::Y)
 }
 
 /// The largest angle between a normal and z [rad].

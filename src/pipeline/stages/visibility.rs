@@ -47,14 +47,14 @@ impl Stage for ComputeVisibility<'_> {
         let (mesh, facets, settings) = (&self.tile.mesh, &**self.facets, self.settings);
         let grid = || PeriodicGrid::for_slices(mesh).cancelled_by(&env.cancel);
         let (azimuths, width) = (settings.horizon_azimuths, settings.penumbra);
+        let of_map = |map: HorizonMap| Visibility::HorizonMap(if self.tile.extruded { map.of_extruded() } else { map });
         Ok(match (self.algorithm, &mesh.height_grid) {
             (VisibilityAlgorithm::None, _) => Visibility::Unblocked { facets: facets.len() },
             (VisibilityAlgorithm::HeightMarch, Some(heights)) => {
-                let map = HorizonMap::cancellable_march(heights, mesh.size, facets, azimuths, width, &env.cancel);
-                Visibility::HorizonMap(map)
+                of_map(HorizonMap::cancellable_march(heights, mesh.size, facets, azimuths, width, &env.cancel))
             }
             (VisibilityAlgorithm::HeightMarch | VisibilityAlgorithm::HorizonScan, _) => {
-                Visibility::HorizonMap(HorizonMap::scan(&grid(), facets, azimuths, width))
+                of_map(HorizonMap::scan(&grid(), facets, azimuths, width))
             }
             (VisibilityAlgorithm::OcclusionIntervals, _) => {
                 let coarser = match self.coarser {
