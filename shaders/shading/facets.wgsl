@@ -20,6 +20,8 @@ struct Sum {
     color: vec3f,
     // Flags of a pass over projected areas: 1 for the first pass, 2 for the last, 3 for both.
     area_pass: u32,
+    // The direction across grooves, to which the horizons belong; 0 for a surface without.
+    across: vec2f,
 }
 
 @group(1) @binding(0) var<uniform> sum: Sum;

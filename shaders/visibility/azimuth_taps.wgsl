@@ -24,14 +24,23 @@ fn sine(x: f32) -> f32 {
 }
 
 fn visibility_taps(d: vec3f) -> VisibilityTaps {
+    let scale = max(length(d.xy), MIN_COSINE) * sum.sharpness;
+    let base = 0.5 + d.z * sum.sharpness;
+    if any(sum.across != vec2f(0.0)) {
+        // The slope of a wall, times its cosine, times that of the elevation.
+        let over_walls = dot(sum.across, d.xy);
+        let along_walls = sum.across.x * d.y - sum.across.y * d.x;
+        let scales = vec2f(max(abs(over_walls), MIN_COSINE), abs(along_walls)) * sum.sharpness;
+        let quarter = select(select(2u, 1u, along_walls >= 0.0), select(3u, 0u, along_walls >= 0.0), over_walls >= 0.0);
+        return VisibilityTaps(
+            quarter, (quarter + 1u) % 4u, 0.0, base, scale, select(scales, scales.yx, quarter % 2u == 1u));
+    }
     let at = azimuth_in_turns(d.xy) * f32(sum.azimuths);
     let lower = u32(at) % sum.azimuths;
     let blend = at - floor(at);
-    let scale = max(length(d.xy), MIN_COSINE) * sum.sharpness;
     // Over a small step the weights are linear.
     let step = select(TAU / f32(sum.azimuths), 1e-3, sum.azimuths < 4u);
     let weights = vec2f(sine((1.0 - blend) * step), sine(blend * step)) / sine(step);
-    let base = 0.5 + d.z * sum.sharpness;
     return VisibilityTaps(lower, (lower + 1u) % sum.azimuths, blend, base, scale, scale * weights);
 }
 

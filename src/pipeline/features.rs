@@ -53,7 +53,7 @@ impl Pipeline {
             grey: used.iter().all(|&k| crate::interreflection::is_grey(&materials[k])) && !sum.colors_vary(),
             height_samples: tile.mesh.height_grid.is_some(),
             height_field: tile.height_field,
-            extruded: tile.extruded,
+            extruded: tile.across.is_some(),
             closes_plane: tile.mesh.closes_plane,
             maps_on_gpu,
             triangles: tile.mesh.triangles.len(),

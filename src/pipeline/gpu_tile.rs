@@ -106,6 +106,10 @@ impl Pipeline {
         let of_intervals = settings.slice_azimuths.min(of_intervals);
         let (mesh, facets) = (&tile.mesh, facets.value.clone());
         Ok(match (plan.algorithm, &mesh.height_grid) {
+            // The GPU computes no horizons across grooves, and the CPU needs only two of each facet.
+            (VisibilityAlgorithm::HeightMarch | VisibilityAlgorithm::HorizonScan, _) if tile.across.is_some() => {
+                GpuVisibilityInput::Computed(self.visibility(inputs, times)?.value)
+            }
             (VisibilityAlgorithm::HeightMarch, Some(samples)) => GpuVisibilityInput::Heights(HeightMarchInput {
                 samples: samples.clone(),
                 tile_size: mesh.size,

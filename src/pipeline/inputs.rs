@@ -63,8 +63,8 @@ impl Pipeline {
                 FacetsRole::Clusters
             }
         };
-        if tile.extruded {
-            settings.horizon_azimuths = HorizonMap::AZIMUTHS_OF_EXTRUDED;
+        if tile.across.is_some() {
+            settings.horizon_azimuths = HorizonMap::AZIMUTHS_OF_GROOVES;
         }
         let materials = self.assignment(loaded, &tile, times)?;
         let facets = self.facets(&tile, &settings, role, times)?;

@@ -183,7 +183,7 @@ fn visibility(context: &Context<'_>, switch: Switch) -> Decision {
     };
     let of_map = format!(
         "{}: a horizon map of {azimuths} azimuths",
-        if features.extruded { "no overhangs, and no change along one axis" } else { "no overhangs" },
+        if features.extruded { "no overhangs, and no change along one direction" } else { "no overhangs" },
     );
     let (reason, predicted_ms) = match algorithm {
         VisibilityAlgorithm::None => (no_visibility(context, switch), 0.0),

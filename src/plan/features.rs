@@ -21,7 +21,7 @@ pub struct SceneFeatures {
     pub mirrors: Option<[bool; 2]>,
     pub height_samples: bool,
     pub height_field: bool,
-    /// Nothing overhangs, and the surface does not change along x or along y.
+    /// Nothing overhangs, and the surface does not change along one direction of the plane.
     pub extruded: bool,
     pub closes_plane: bool,
     /// True if a GPU draws shadow maps.

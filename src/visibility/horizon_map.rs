@@ -3,7 +3,7 @@
 use std::f32::consts::{FRAC_PI_2, TAU};
 use std::ops::Range;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::Resolution;
@@ -34,9 +34,38 @@ pub struct HorizonMap {
     pub(super) slopes: Vec<f32>,
     /// Number of truncated walks.
     pub(super) truncated: usize,
-    /// True if the interpolation between the azimuths is exact.
-    pub(super) is_exact_between: bool,
+    /// The direction of [`Azimuths::Across`], between which the interpolation is exact.
+    pub(crate) across: Option<Vec2>,
     weights: SineWeights,
+}
+
+/// The azimuths of a horizon map.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Azimuths {
+    /// A number of azimuths at equal distances, from x on.
+    Even(usize),
+    /// The azimuths across and along grooves, from one unit direction across them on. They determine all others: at an
+    /// angle φ to the plane across the grooves, a horizon has `cos φ` times the slope of that across them.
+    Across(Vec2),
+}
+
+impl Azimuths {
+    pub fn count(self) -> usize {
+        match self {
+            Self::Even(count) => count,
+            Self::Across(_) => HorizonMap::AZIMUTHS_OF_GROOVES,
+        }
+    }
+
+    /// The unit direction of one azimuth in the plane. `None` along grooves, where nothing rises.
+    fn along(self, azimuth: usize) -> Option<Vec3> {
+        match self {
+            Self::Even(count) => Some(from_angles(FRAC_PI_2, TAU * azimuth as f32 / count as f32)),
+            Self::Across(across) => {
+                [Some(across), None, Some(-across), None][azimuth % 4].map(|along| along.extend(0.0))
+            }
+        }
+    }
 }
 
 /// The weights `sin((1-t)Δ)/sin Δ` and `sin(tΔ)/sin Δ` of two azimuths Δ apart, at fraction t of the way. They
@@ -74,21 +103,24 @@ impl HorizonMap {
     const FREE: f32 = -0.020_002_667;
     /// A slope so high that the transition never reaches the zenith. It is finite, so that its product with 0 is 0.
     pub(super) const BLOCKED: f32 = 1e9;
-    /// Azimuths that determine all others on a surface that does not change along x or along y. Its horizon at an angle φ to
-    /// the plane across the grooves has `cos φ` times the slope of that across them, which the interpolation follows exactly.
-    pub(crate) const AZIMUTHS_OF_EXTRUDED: usize = 4;
+    /// Number of [`Azimuths::Across`].
+    pub(crate) const AZIMUTHS_OF_GROOVES: usize = 4;
     /// Smallest cosine of an elevation. Times [`HorizonMap::BLOCKED`] it is far above 1, so that blocked facets are
     /// blocked at the zenith.
     const MIN_COSINE: f32 = 1e-6;
 
     /// Cuts the mesh along every azimuth for every facet. Slopes are exact.
     pub fn scan(grid: &PeriodicGrid, facets: &Facets, azimuths: usize, transition_width: f32) -> Self {
+        Self::scan_along(grid, facets, Azimuths::Even(azimuths), transition_width)
+    }
+
+    pub(crate) fn scan_along(grid: &PeriodicGrid, facets: &Facets, azimuths: Azimuths, transition_width: f32) -> Self {
         let (slicer, origins) = (Slicer::new(grid), lifted_origins(facets, grid.tile_size));
         Self::fill_rows(facets.len(), azimuths, transition_width, |along, row| {
             let truncated = scan_all(&slicer.rotated(along.truncate()), facets, &origins, &mut |facet, blocked| {
                 row[facet as usize] = blocked.highest();
             });
-            grid.cancel.step(azimuths);
+            grid.cancel.step(azimuths.count());
             truncated
         })
     }
@@ -97,20 +129,21 @@ impl HorizonMap {
     /// times faster.
     pub fn march(
         heights: &HeightGrid,
-        tile_size: glam::Vec2,
+        tile_size: Vec2,
         facets: &Facets,
         azimuths: usize,
         transition_width: f32,
     ) -> Self {
+        let azimuths = Azimuths::Even(azimuths);
         Self::cancellable_march(heights, tile_size, facets, azimuths, transition_width, &Cancel::default())
     }
 
     /// As [`HorizonMap::march`], with a count of the azimuths that are done.
     pub(crate) fn cancellable_march(
         heights: &HeightGrid,
-        tile_size: glam::Vec2,
+        tile_size: Vec2,
         facets: &Facets,
-        azimuths: usize,
+        azimuths: Azimuths,
         transition_width: f32,
         cancel: &Cancel,
     ) -> Self {
@@ -119,7 +152,7 @@ impl HorizonMap {
             if !cancel.is_set() {
                 march_all(&march, facets, along.truncate(), row);
             }
-            cancel.step(azimuths);
+            cancel.step(azimuths.count());
             0
         })
     }
@@ -128,15 +161,18 @@ impl HorizonMap {
     /// of truncated walks.
     fn fill_rows(
         facets: usize,
-        azimuths: usize,
+        azimuths: Azimuths,
         transition_width: f32,
         fill: impl Fn(Vec3, &mut [f32]) -> usize + Sync,
     ) -> Self {
-        let mut slopes = vec![0.0; facets * azimuths];
+        let mut slopes = vec![0.0; facets * azimuths.count()];
         let rows = slopes.par_chunks_mut(facets.max(1)).enumerate();
-        let truncated =
-            rows.map(|(azimuth, row)| fill(from_angles(FRAC_PI_2, TAU * azimuth as f32 / azimuths as f32), row)).sum();
-        Self { truncated, ..Self::from_slopes(facets, azimuths, transition_width, slopes) }
+        let truncated = rows.map(|(azimuth, row)| azimuths.along(azimuth).map_or(0, |along| fill(along, row))).sum();
+        let across = match azimuths {
+            Azimuths::Even(_) => None,
+            Azimuths::Across(across) => Some(across),
+        };
+        Self { truncated, across, ..Self::from_slopes(facets, azimuths.count(), transition_width, slopes) }
     }
 
     /// Takes slopes of the horizons in `[0, ∞]`, by `[azimuth][facet]`.
@@ -152,24 +188,17 @@ impl HorizonMap {
             }
         });
         let slopes = stored;
-        Self::stored([azimuths, facets, 0], false, Self::clamped_width(transition_width), slopes)
+        Self::stored([azimuths, facets, 0], None, Self::clamped_width(transition_width), slopes)
     }
 
     /// The map of stored slopes, from the numbers of azimuths, facets and truncated walks.
     pub(super) fn stored(
         [azimuths, facets, truncated]: [usize; 3],
-        is_exact_between: bool,
+        across: Option<Vec2>,
         transition_width: f32,
         slopes: Vec<f32>,
     ) -> Self {
-        let weights = SineWeights::new(azimuths);
-        Self { azimuths, facets, transition_width, slopes, truncated, is_exact_between, weights }
-    }
-
-    /// States that the facets lie on a surface that does not change along x or along y, so that the interpolation between
-    /// [`HorizonMap::AZIMUTHS_OF_EXTRUDED`] azimuths is exact.
-    pub(crate) fn of_extruded(self) -> Self {
-        Self { is_exact_between: self.azimuths == Self::AZIMUTHS_OF_EXTRUDED, ..self }
+        Self { azimuths, facets, transition_width, slopes, truncated, across, weights: SineWeights::new(azimuths) }
     }
 
     /// Clamps a width of the transition [rad] to the range that a horizon map supports.
@@ -207,25 +236,34 @@ impl HorizonMap {
     /// The taps of a unit direction above the plane.
     pub(crate) fn taps(&self, direction: Vec3) -> HorizonTaps {
         let (azimuth, cosine) = simd::azimuth_and_cosine(direction);
-        self.taps_at(azimuth, direction.z, cosine)
+        self.taps_at(direction, azimuth, cosine)
     }
 
-    /// The taps of an azimuth [turns, at most 1], and of the sine and the cosine of an elevation.
-    pub(crate) fn taps_at(&self, azimuth: f32, sine: f32, cosine: f32) -> HorizonTaps {
+    /// As [`HorizonMap::taps`], from the azimuth of the direction [turns, at most 1] and the cosine of its elevation.
+    pub(crate) fn taps_at(&self, direction: Vec3, azimuth: f32, cosine: f32) -> HorizonTaps {
+        let sharpness = 1.0 / self.transition_width;
+        let scale = cosine.max(Self::MIN_COSINE) * sharpness;
+        let base = 0.5 + direction.z * sharpness;
+        if let Some(across) = self.across {
+            // The slope of a wall, times its cosine, times that of the elevation.
+            let along_walls = across.perp_dot(direction.truncate());
+            let over_walls = across.dot(direction.truncate());
+            let (b, a) = (along_walls.abs() * sharpness, over_walls.abs().max(Self::MIN_COSINE) * sharpness);
+            let (azimuths, scales) = match (over_walls >= 0.0, along_walls >= 0.0) {
+                (true, true) => ([0, 1], [a, b]),
+                (false, true) => ([1, 2], [b, a]),
+                (false, false) => ([2, 3], [a, b]),
+                (true, false) => ([3, 0], [b, a]),
+            };
+            return HorizonTaps { azimuths, blend: 0.0, base, scale, scales };
+        }
         let at = azimuth * self.azimuths as f32;
         let below = at as usize;
         // No division: rendering calls this function for each light of each pixel.
         let wrapped = |azimuth: usize| if azimuth >= self.azimuths { azimuth - self.azimuths } else { azimuth };
         let (from, blend) = (wrapped(below), at - below as f32);
-        let sharpness = 1.0 / self.transition_width;
-        let scale = cosine.max(Self::MIN_COSINE) * sharpness;
-        HorizonTaps {
-            azimuths: [from, wrapped(from + 1)],
-            blend,
-            base: 0.5 + sine * sharpness,
-            scale,
-            scales: self.weights.at(blend).map(|weight| weight * scale),
-        }
+        let scales = self.weights.at(blend).map(|weight| weight * scale);
+        HorizonTaps { azimuths: [from, wrapped(from + 1)], blend, base, scale, scales }
     }
 
     /// The taps of a unit direction above the plane at a lower resolution.

@@ -30,22 +30,25 @@ fn the_slope_of_a_straight_wall_is_exact_between_azimuths() {
 fn the_slope_in_a_groove_is_exact_at_all_azimuths() {
     // Facets of a groove along y: in the middle, at a wall that rises towards -x, and on top.
     let sides = [[1.5_f32, 0.8], [0.0, 3.0], [0.0, 0.0]];
-    for azimuths in [4, 8, 48] {
-        let wall = |[right, left]: [f32; 2], azimuth: f32| {
-            let across = azimuth.cos();
+    let even = [4, 8, 48].map(|azimuths| (Azimuths::Even(azimuths), Vec2::X));
+    let turned = [0.0, 0.3, 2.0, 4.0, 6.2].map(Vec2::from_angle).map(|across| (Azimuths::Across(across), across));
+    for (azimuths, across) in even.into_iter().chain(turned) {
+        let wall = |[right, left]: [f32; 2], along: Vec3| {
+            let across = along.truncate().normalize().dot(across);
             if across.abs() < 1e-6 { 0.0 } else { (across * right).max(-across * left) }
         };
-        let nodes = (0..azimuths).map(|node| TAU * node as f32 / azimuths as f32);
-        let slopes = nodes.flat_map(|node| sides.map(|sides| wall(sides, node))).collect();
-        let map = HorizonMap::from_slopes(sides.len(), azimuths, 1e-4, slopes);
+        let map = HorizonMap::fill_rows(sides.len(), azimuths, 1e-4, |along, row| {
+            row.iter_mut().zip(sides).for_each(|(slope, sides)| *slope = wall(sides, along));
+            0
+        });
         for direction in directions() {
             let mut visibility = [f32::NAN; 3];
             map.fill(direction, 0..3, &mut visibility);
             let slope = direction.z / direction.truncate().length();
             for (visible, sides) in visibility.into_iter().zip(sides) {
-                let above = slope - wall(sides, direction.y.atan2(direction.x));
+                let above = slope - wall(sides, direction);
                 if above.abs() * direction.truncate().length() > 1e-4 && direction.z > 1e-4 {
-                    assert_eq!(visible, f32::from(above > 0.0), "{azimuths} azimuths, {sides:?}, {direction}");
+                    assert_eq!(visible, f32::from(above > 0.0), "{azimuths:?}, {sides:?}, {direction}");
                 }
             }
         }

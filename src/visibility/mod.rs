@@ -21,6 +21,7 @@ use std::ops::Range;
 
 use glam::Vec3;
 
+pub(crate) use horizon_map::Azimuths;
 pub use horizon_map::HorizonMap;
 pub use occlusion_intervals::OcclusionIntervals;
 pub use packed::PackedVisibility;
@@ -100,7 +101,7 @@ impl Visibility {
         match self {
             Self::Unblocked { .. } | Self::Maps(_) => false,
             Self::HorizonMap(map) | Self::OcclusionIntervals(OcclusionIntervals { horizon_map: map, .. }) => {
-                map.azimuths().is_multiple_of(step) && !map.is_exact_between
+                map.azimuths().is_multiple_of(step) && map.across.is_none()
             }
         }
     }

@@ -1,5 +1,7 @@
 //! Storage of [`Visibility`] in the disk cache, and its contribution to the keys of later stages.
 
+use glam::Vec2;
+
 use super::occlusion_intervals::Overhangs;
 use super::{HorizonMap, OcclusionIntervals, PackedVisibility, SoftMaps, Visibility};
 use crate::cache::{Reader, Stored, Writer};
@@ -78,16 +80,18 @@ impl Stored for Visibility {
 
 fn write_horizon_map(horizon_map: &HorizonMap, out: &mut Writer) {
     [horizon_map.azimuths, horizon_map.facets, horizon_map.truncated].into_iter().for_each(|count| out.count(count));
-    out.count(usize::from(horizon_map.is_exact_between));
     out.numbers(&[horizon_map.transition_width]);
+    out.numbers(&horizon_map.across.map_or_else(Vec::new, |across| across.to_array().to_vec()));
     out.numbers(&horizon_map.slopes);
 }
 
 fn read_horizon_map(from: &mut Reader<'_>) -> Option<HorizonMap> {
     let [azimuths, facets, truncated] = [from.count()?, from.count()?, from.count()?];
-    let is_exact_between = from.count()? == 1;
     let transition_width = from.numbers()?.first().copied()?;
+    let across = from.numbers::<f32>()?.first_chunk().map(|across| Vec2::from_array(*across));
     let slopes: Vec<f32> = from.numbers()?;
-    let fits = azimuths > 0 && azimuths.checked_mul(facets)? == slopes.len();
-    fits.then(|| HorizonMap::stored([azimuths, facets, truncated], is_exact_between, transition_width, slopes))
+    let fits = azimuths > 0
+        && azimuths.checked_mul(facets)? == slopes.len()
+        && (across.is_none() || azimuths == HorizonMap::AZIMUTHS_OF_GROOVES);
+    fits.then(|| HorizonMap::stored([azimuths, facets, truncated], across, transition_width, slopes))
 }

@@ -59,7 +59,7 @@ impl ClusteredSum {
             pairs.set(lights, view.o);
             let mut taps = [HorizonTaps::ABOVE_ALL; LightPairs::MAX];
             for (k, taps) in taps.iter_mut().enumerate().take(lights.len()) {
-                *taps = view.horizon_map.taps_at(pairs.azimuths[k], pairs.i[2][k], pairs.cosines[k]);
+                *taps = view.horizon_map.taps_at(pairs.light(k), pairs.azimuths[k], pairs.cosines[k]);
             }
             let mut totals = [DVec3::ZERO; LightPairs::MAX];
             for (index, (group, cluster)) in clusters(view.sum).enumerate() {

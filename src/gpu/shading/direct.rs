@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use super::clustered_sum::{ClusterPasses, bounds_shader};
 use super::tabulate::Preparation;
@@ -32,6 +32,9 @@ pub(crate) struct Sum {
     pub(crate) color: Vec3,
     /// Flags of a pass over projected areas: 1 for the first pass, 2 for the last, 3 for both.
     pub(crate) area_pass: u32,
+    /// The direction across grooves; 0 for a surface without.
+    pub(crate) across: Vec2,
+    pub(crate) padding: [u32; 2],
 }
 
 /// Largest number of facets of one pass on software Vulkan. llvmpipe silently ends all loops of a thread after a total

@@ -9,7 +9,7 @@ use crate::brdf::{Brdf, Material, Term};
 use crate::effective::{Direct, EffectiveBrdf, FacetSum, Interpolation, Nodes, Representation, ShadingTable};
 use crate::geometry::Facets;
 use crate::gpu::shading::tests::{
-    FLAT, LOBES, PYRAMIDS, SHADING_TOLERANCE, TestScene, distances, effective, open, open_gpu, radiance,
+    FLAT, GROOVES, LOBES, PYRAMIDS, SHADING_TOLERANCE, TestScene, distances, effective, open, open_gpu, radiance,
 };
 use crate::gpu::shading::visibility::GpuVisibility;
 use crate::gpu::shading::{GpuMaterial, GpuShading};
@@ -190,11 +190,10 @@ fn normal_clusters_have_the_same_visible_areas_as_on_the_cpu() {
     let Some(gpu) = open_gpu() else { return };
     let two = format!("[{}, {}]", LOBES[4], LOBES[0]);
     // A mirror plane of the tile maps one normal to another, so tables of cluster areas use no mirror planes.
-    // Along a node of 29 azimuths lies only the first, where all facets of a normal may meet an edge. Grooves along an axis,
-    // like those of the cup, have four azimuths.
-    const TURNED: &str = "{ kind = \"grooves\", rotation_deg = 45 }";
-    for (geometry, columns) in [(PYRAMIDS, 4), (TURNED, 3)] {
+    const TURNED: &str = "{ kind = \"grooves\", count = 4, rotation_deg = 27 }";
+    for (geometry, columns) in [(PYRAMIDS, 4), (GROOVES, 3), (TURNED, 3)] {
         let mut scene = open(geometry, &two, "direct");
+        // With 29 azimuths, only the first lies along a node of the table, where all facets of a normal may meet an edge.
         scene.scene.quality.azimuths = Some(29);
         let brdf = effective(&scene);
         assert_eq!(assert_same_table(geometry, &gpu, &brdf, [true; 2]), columns);

@@ -39,7 +39,9 @@ impl GpuVisibility<'_> {
         };
         match self {
             Self::Computed(Visibility::Unblocked { .. }) => sum,
-            Self::Computed(Visibility::HorizonMap(map)) => horizons(map.azimuths(), map.transition_width),
+            Self::Computed(Visibility::HorizonMap(map)) => {
+                Sum { across: map.across.unwrap_or_default(), ..horizons(map.azimuths(), map.transition_width) }
+            }
             Self::Computed(Visibility::OcclusionIntervals(intervals)) => {
                 horizons(intervals.horizon_map.azimuths(), intervals.horizon_map.transition_width)
             }

@@ -119,9 +119,9 @@ impl Stage for ColorTile<'_> {
         let map = LayeredMap::new(map, *relief.value, &|driver| drivers.find(driver));
         let mut mesh = tile.mesh.clone();
         mesh.color = ColorField::Mapped { map: Arc::new(map), below: Box::new(mesh.color) };
-        let TileShape { surface, flat, height_field, extruded, steepest, colors_place_facets, .. } = *tile.value;
+        let TileShape { surface, flat, height_field, across, steepest, colors_place_facets, .. } = *tile.value;
         let below = Some((*tile).clone());
-        Ok(TileShape { mesh, below, surface, flat, height_field, extruded, steepest, colors_place_facets })
+        Ok(TileShape { mesh, below, surface, flat, height_field, across, steepest, colors_place_facets })
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use crate::base::Result;
@@ -28,8 +28,9 @@ pub struct TileShape {
     pub flat: bool,
     /// Nothing overhangs.
     pub height_field: bool,
-    /// Nothing overhangs, and the surface is the same everywhere along x or along y, like grooves.
-    pub extruded: bool,
+    /// The unit direction across the grooves, if nothing overhangs and the surface does not change along another direction
+    /// of the plane.
+    pub across: Option<Vec2>,
     /// The largest angle between a surface normal and z [rad].
     pub steepest: f32,
     /// The colours decide where facets are, because the image has rare bright texels.
@@ -123,20 +124,11 @@ impl Stage for BuildTile<'_> {
         let flat = high - low <= 1e-7 * mesh.size.max_element();
         let is_of_file = matches!(scene.tile.geometry, Geometry::Mesh(_));
         let height_field = mesh.is_height_field() || !is_of_file && mesh.closes_plane && nothing_faces_down(&mesh);
-        let extruded = !flat && height_field && mesh.closes_plane && is_same_along_an_axis(&mesh);
+        let across = if !flat && height_field && mesh.closes_plane { across_grooves(&mesh) } else { None };
         let steepest = steepest(&mesh);
         let colors_place_facets = colors_place_facets(&mesh);
         let below = None;
-        Ok(TileShape {
-            mesh,
-            below,
-            surface: self.surface,
-            flat,
-            height_field,
-            extruded,
-            steepest,
-            colors_place_facets,
-        })
+        Ok(TileShape { mesh, below, surface: self.surface, flat, height_field, across, steepest, colors_place_facets })
     }
 }
 
@@ -147,11 +139,13 @@ fn nothing_faces_down(mesh: &TileMesh) -> bool {
     (0..mesh.triangles.len()).all(|triangle| mesh.geometric_normal(triangle).z > -1e-6)
 }
 
-/// Returns true if a closed surface does not change along x, or not along y.
-fn is_same_along_an_axis(mesh: &TileMesh) -> bool {
-    let is_same =
-        |axis: Vec3| (0..mesh.triangles.len()).all(|triangle| mesh.geometric_normal(triangle).dot(axis).abs() <= 1e-6);
-    is_same(Vec3::X) || is_same(Vec3::Y)
+/// The unit direction across the grooves of a closed surface, if it does not change along the direction at a right angle.
+fn across_grooves(mesh: &TileMesh) -> Option<Vec2> {
+    /// Largest component of a normal along the grooves. It is due to rounding.
+    const MOST_ALONG: f32 = 1e-5;
+    let normals = || (0..mesh.triangles.len()).map(|triangle| mesh.geometric_normal(triangle).truncate());
+    let across = normals().max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))?.try_normalize()?;
+    normals().all(|normal| across.perp_dot(normal).abs() <= MOST_ALONG).then_some(across)
 }
 
 /// The largest angle between a normal and z [rad].

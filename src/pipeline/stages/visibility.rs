@@ -6,7 +6,7 @@ use crate::geometry::{Facets, PeriodicGrid};
 use crate::pipeline::Env;
 use crate::pipeline::stage::{Codec, Keyed, Stage};
 use crate::plan::{Settings, VisibilityAlgorithm};
-use crate::visibility::{HorizonMap, OcclusionIntervals, SoftMaps, Visibility, cancellable_maps_cpu};
+use crate::visibility::{Azimuths, HorizonMap, OcclusionIntervals, SoftMaps, Visibility, cancellable_maps_cpu};
 
 use super::TileShape;
 use super::tile::hash_sampling_into;
@@ -46,15 +46,19 @@ impl Stage for ComputeVisibility<'_> {
     fn run(&self, env: &Env) -> Result<Visibility> {
         let (mesh, facets, settings) = (&self.tile.mesh, &**self.facets, self.settings);
         let grid = || PeriodicGrid::for_slices(mesh).cancelled_by(&env.cancel);
-        let (azimuths, width) = (settings.horizon_azimuths, settings.penumbra);
-        let of_map = |map: HorizonMap| Visibility::HorizonMap(if self.tile.extruded { map.of_extruded() } else { map });
+        let width = settings.penumbra;
+        let azimuths = match self.tile.across {
+            Some(across) => Azimuths::Across(across),
+            None => Azimuths::Even(settings.horizon_azimuths),
+        };
         Ok(match (self.algorithm, &mesh.height_grid) {
             (VisibilityAlgorithm::None, _) => Visibility::Unblocked { facets: facets.len() },
             (VisibilityAlgorithm::HeightMarch, Some(heights)) => {
-                of_map(HorizonMap::cancellable_march(heights, mesh.size, facets, azimuths, width, &env.cancel))
+                let map = HorizonMap::cancellable_march(heights, mesh.size, facets, azimuths, width, &env.cancel);
+                Visibility::HorizonMap(map)
             }
             (VisibilityAlgorithm::HeightMarch | VisibilityAlgorithm::HorizonScan, _) => {
-                of_map(HorizonMap::scan(&grid(), facets, azimuths, width))
+                Visibility::HorizonMap(HorizonMap::scan_along(&grid(), facets, azimuths, width))
             }
             (VisibilityAlgorithm::OcclusionIntervals, _) => {
                 let coarser = match self.coarser {
