@@ -4,10 +4,9 @@ use super::*;
 use crate::metrics::mirror_biased_pairs;
 use crate::pipeline::Outcome;
 
-/// Grooves of this depth, whose horizons jump between azimuths.
-fn grooves(depth: &str) -> [&str; 3] {
-    [depth, "tile.geometry.side_angle_deg=89", "tile.geometry.rotation_deg=32"]
-}
+/// Pyramids so high that their horizons jump between azimuths.
+const DIFFICULT: &str = "fig5d_pentagonal";
+const HIGH: &str = "tile.geometry.height=2";
 
 fn open(scene: &str, preset: &str, settings: &[&str]) -> LoadedScene {
     let mut all = vec![format!("quality.preset={preset}"), "quality.backend=cpu".to_owned()];
@@ -40,9 +39,9 @@ fn a_result_within_its_bound_has_the_same_bits_without_refinement() {
 
 #[test]
 fn a_difficult_tile_is_refined_until_it_states_an_error_within_the_bound() {
-    let plain = effective(&open("fig1d_yellow_sides", "standard", &["quality.adaptive=false"]));
+    let plain = effective(&open(DIFFICULT, "standard", &["quality.adaptive=false"]));
     let bound = plain.settings.error_bound().unwrap();
-    let loaded = open("fig1d_yellow_sides", "standard", &grooves("tile.geometry.depth=5"));
+    let loaded = open(DIFFICULT, "standard", &[HIGH]);
     let outcome = effective(&loaded);
     assert!(refines(&outcome), "{:?}", outcome.errors().unwrap().estimate());
     assert!(
@@ -57,8 +56,9 @@ fn a_difficult_tile_is_refined_until_it_states_an_error_within_the_bound() {
 #[test]
 fn a_stage_that_refinement_repeats_is_listed_once_with_the_time_of_all_its_runs() {
     let start = std::time::Instant::now();
-    let outcome = effective(&open("fig1d_yellow_sides", "draft", &grooves("tile.geometry.depth=40")));
+    let outcome = effective(&open(DIFFICULT, "draft", &[HIGH]));
     let elapsed = crate::pipeline::stage::elapsed_ms(start);
+    assert!(refines(&outcome), "{:?}", outcome.notes);
     let of =
         |stage: &str| outcome.times.iter().filter(|(name, _)| *name == stage).map(|(_, ms)| *ms).collect::<Vec<_>>();
     assert!(outcome.times.iter().all(|(name, _)| of(name).len() == 1), "{:?}", outcome.times);
@@ -84,8 +84,8 @@ fn limits_end_refinement_and_a_warning_states_the_error() {
 #[test]
 fn a_refined_result_does_not_depend_on_earlier_edits() {
     let pipeline = Pipeline::new();
-    let refined = open("fig1d_yellow_sides", "draft", &grooves("tile.geometry.depth=40"));
-    let plain = open("fig1d_yellow_sides", "draft", &["tile.geometry.depth=0.02"]);
+    let refined = open(DIFFICULT, "standard", &["tile.geometry.height=1"]);
+    let plain = open(DIFFICULT, "standard", &["tile.geometry.height=0.02"]);
     let first = pipeline.effective(&refined).unwrap();
     assert!(refines(&first) && first.notes.iter().any(|note| note.starts_with("interreflection refined to ")));
     let first = values(&first);
@@ -97,7 +97,7 @@ fn a_refined_result_does_not_depend_on_earlier_edits() {
 #[test]
 fn a_scene_that_sets_the_resolution_is_not_refined() {
     for setting in ["quality.facets=64", "quality.azimuths=4", "quality.penumbra_deg=2.0"] {
-        let outcome = effective(&open("fig1d_yellow_sides", "draft", &[setting, "tile.geometry.depth=2.5"]));
+        let outcome = effective(&open(DIFFICULT, "draft", &[setting, HIGH]));
         assert!(!refines(&outcome) && outcome.times.iter().all(|(name, _)| *name != "error_estimate"), "{setting}");
     }
 }

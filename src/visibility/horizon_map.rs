@@ -57,6 +57,14 @@ impl Azimuths {
         }
     }
 
+    /// The number of azimuths along which horizons are computed.
+    fn computed(self) -> usize {
+        match self {
+            Self::Even(count) => count,
+            Self::Across(_) => 2,
+        }
+    }
+
     /// The unit direction of one azimuth in the plane. `None` along grooves, where nothing rises.
     fn along(self, azimuth: usize) -> Option<Vec3> {
         match self {
@@ -114,13 +122,14 @@ impl HorizonMap {
         Self::scan_along(grid, facets, Azimuths::Even(azimuths), transition_width)
     }
 
+    /// As [`HorizonMap::scan`], for azimuths about grooves as well.
     pub(crate) fn scan_along(grid: &PeriodicGrid, facets: &Facets, azimuths: Azimuths, transition_width: f32) -> Self {
         let (slicer, origins) = (Slicer::new(grid), lifted_origins(facets, grid.tile_size));
         Self::fill_rows(facets.len(), azimuths, transition_width, |along, row| {
             let truncated = scan_all(&slicer.rotated(along.truncate()), facets, &origins, &mut |facet, blocked| {
                 row[facet as usize] = blocked.highest();
             });
-            grid.cancel.step(azimuths.count());
+            grid.cancel.step(azimuths.computed());
             truncated
         })
     }
@@ -138,7 +147,7 @@ impl HorizonMap {
         Self::cancellable_march(heights, tile_size, facets, azimuths, transition_width, &Cancel::default())
     }
 
-    /// As [`HorizonMap::march`], with a count of the azimuths that are done.
+    /// As [`HorizonMap::march`], for azimuths about grooves as well, and with a count of the azimuths that are done.
     pub(crate) fn cancellable_march(
         heights: &HeightGrid,
         tile_size: Vec2,
@@ -152,7 +161,7 @@ impl HorizonMap {
             if !cancel.is_set() {
                 march_all(&march, facets, along.truncate(), row);
             }
-            cancel.step(azimuths.count());
+            cancel.step(azimuths.computed());
             0
         })
     }
