@@ -352,7 +352,7 @@ impl ErrorEstimator {
         let mut blended = DVec3::ZERO;
         // Projected area and reflection of each replicate, or of all facets.
         let parts: Vec<(f64, DVec3)> = self.direct.with_visibility(i, o, |v_i, v_o| {
-            if is_near {
+            if is_near && !self.direct.visibility.is_exact_between_azimuths() {
                 let blocked: Vec<f32> = v_i.iter().map(|v| 1.0 - v).collect();
                 blended = self.direct.sum.sum(i, o, v_i, &blocked);
             }

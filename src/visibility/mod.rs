@@ -95,13 +95,22 @@ impl Visibility {
         }
     }
 
-    /// Returns true if visibility can be read from every `step`-th azimuth; false for bit maps, and if no azimuth can be
-    /// missed.
+    /// Returns true if visibility between two azimuths follows exactly from that along them.
+    pub(crate) fn is_exact_between_azimuths(&self) -> bool {
+        match self {
+            Self::Unblocked { .. } => true,
+            Self::HorizonMap(map) => map.across.is_some(),
+            Self::OcclusionIntervals(_) | Self::Maps(_) => false,
+        }
+    }
+
+    /// Returns true if visibility can be read from every `step`-th azimuth; false for bit maps, if nothing blocks, and if none
+    /// of the azimuths can be missed.
     pub(crate) fn has_azimuth_step(&self, step: usize) -> bool {
         match self {
             Self::Unblocked { .. } | Self::Maps(_) => false,
             Self::HorizonMap(map) | Self::OcclusionIntervals(OcclusionIntervals { horizon_map: map, .. }) => {
-                map.azimuths().is_multiple_of(step) && map.across.is_none()
+                map.azimuths().is_multiple_of(step) && (step == 1 || !self.is_exact_between_azimuths())
             }
         }
     }

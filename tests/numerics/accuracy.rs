@@ -190,6 +190,8 @@ brdf = { kind = "lambertian", albedo = 1.0 }"#;
             eprintln!("turned by {rotation_deg}, {preset}: {errors:?}");
             assert!(errors.rel_l2 < 0.03, "turned by {rotation_deg}, {preset}: {errors:?}");
             assert_eq!(outcome.settings.horizon_azimuths, 4, "{preset}: others follow from these");
+            let stated = outcome.errors().unwrap().estimate();
+            assert!(stated.azimuths == 0.0 && stated.visibility > 0.0, "the transition has an error: {stated:?}");
         }
     }
 }
