@@ -34,7 +34,7 @@ fn the_slope_in_a_groove_is_exact_at_all_azimuths() {
     let turned = [0.0, 0.3, 2.0, 4.0, 6.2].map(Vec2::from_angle).map(|across| (Azimuths::Across(across), across));
     for (azimuths, across) in even.into_iter().chain(turned) {
         let wall = |[right, left]: [f32; 2], along: Vec3| {
-            let across = along.truncate().normalize().dot(across);
+            let across = along.truncate().normalize_or_zero().dot(across);
             if across.abs() < 1e-6 { 0.0 } else { (across * right).max(-across * left) }
         };
         let map = HorizonMap::fill_rows(sides.len(), azimuths, 1e-4, |along, row| {
