@@ -143,9 +143,17 @@ fn nothing_faces_down(mesh: &TileMesh) -> bool {
 fn across_grooves(mesh: &TileMesh) -> Option<Vec2> {
     /// Largest component of a normal along the grooves. It is due to rounding.
     const MOST_ALONG: f32 = 1e-5;
+    /// The same for a direction across them that a normal of this slope shows.
+    const ROUGHLY: f32 = 1e-2;
     let normals = || (0..mesh.triangles.len()).map(|triangle| mesh.geometric_normal(triangle).truncate());
+    let are_across = |across: Vec2, most: f32| normals().all(|normal| across.perp_dot(normal).abs() <= most);
+    // On most other surfaces this ends after a few triangles.
+    let first = normals().find(|normal| normal.length() > ROUGHLY).and_then(Vec2::try_normalize);
+    if !first.is_none_or(|first| are_across(first, ROUGHLY)) {
+        return None;
+    }
     let across = normals().max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))?.try_normalize()?;
-    normals().all(|normal| across.perp_dot(normal).abs() <= MOST_ALONG).then_some(across)
+    are_across(across, MOST_ALONG).then_some(across)
 }
 
 /// The largest angle between a normal and z [rad].
