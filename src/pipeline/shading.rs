@@ -10,7 +10,7 @@ use glam::{DVec3, Vec3};
 
 use super::Env;
 use super::shading_check::{Check, CheckedErrors};
-use super::stage::{Codec, Keyed, Stage, StageTimes, elapsed_ms, lock, run_without_memo};
+use super::stage::{Codec, Keyed, Stage, StageTimes, elapsed_ms, key_of, lock, run_without_memo};
 use super::stages::TileShape;
 use crate::base::{Cancel, Error, Result};
 use crate::cache::{Cache, Key, KeyBuilder};
@@ -175,9 +175,9 @@ impl Shading {
             return Ok((Arc::new(brdf), Some(errors)));
         }
         Ok(match self.table(&mut check, cancel, times)? {
-            (Some((table, errors)), _) => {
+            (Some(table), errors) => {
                 let (brdf, errors) = self.with_bounced_columns(table, errors, &mut check, cancel)?;
-                (Arc::new(brdf), Some(errors))
+                (Arc::new(brdf), errors)
             }
             (None, errors) => (self.exact.clone(), errors),
         })
@@ -188,10 +188,10 @@ impl Shading {
     fn with_bounced_columns(
         &self,
         found: EffectiveBrdf,
-        errors: Errors,
+        errors: Option<Errors>,
         check: &mut Check,
         cancel: &Cancel,
-    ) -> Result<(EffectiveBrdf, Errors)> {
+    ) -> Result<(EffectiveBrdf, Option<Errors>)> {
         let Representation::Interreflecting(direct, bounced) = &found.representation else {
             return Ok((found, errors));
         };
@@ -205,7 +205,7 @@ impl Shading {
         let representation = Representation::Table(table.plus_bounced(sum, cancel)?);
         let brdf = EffectiveBrdf { representation, base_area };
         let with_bounced = self.decided_errors(&brdf, check, cancel)?;
-        Ok(if self.is_close(with_bounced) { (brdf, with_bounced) } else { (found, errors) })
+        Ok(if self.is_close(with_bounced) { (brdf, Some(with_bounced)) } else { (found, errors) })
     }
 
     /// A sum over a strided subset of the facets, if it is close enough.
@@ -218,14 +218,13 @@ impl Shading {
         })
     }
 
-    /// The coarsest table that is close enough and its errors, or the errors of the last one that was tried.
-    #[expect(clippy::type_complexity, reason = "a table with its errors, or errors alone")]
+    /// The coarsest table that is close enough, and the errors of the last one that was tried.
     fn table(
         &self,
         check: &mut Check,
         cancel: &Cancel,
         times: &mut StageTimes,
-    ) -> Result<(Option<(EffectiveBrdf, Errors)>, Option<Errors>)> {
+    ) -> Result<(Option<EffectiveBrdf>, Option<Errors>)> {
         let mut last = None;
         for grid in &self.grids {
             let errors = match self.attempt(*grid, check, cancel, times)? {
@@ -233,7 +232,7 @@ impl Shading {
                     let brdf = self.with_table(table);
                     let errors = self.decided_errors(&brdf, check, cancel)?;
                     if self.is_close(errors) {
-                        return Ok((Some((brdf, errors)), None));
+                        return Ok((Some(brdf), Some(errors)));
                     }
                     errors
                 }
@@ -344,9 +343,7 @@ impl Shading {
                 }
                 let stage = Tabulate { direct, nodes, keys: self.keys };
                 let env = Env::with_cancel(cancel.clone());
-                let mut key = KeyBuilder::of_stage(Tabulate::NAME);
-                stage.hash_into(&mut key);
-                let key = key.finish();
+                let key = key_of(&stage);
                 let content = match self.recent.get(key) {
                     Some(content) => content,
                     None => {

@@ -132,9 +132,7 @@ impl Memo {
         disk: &Cache,
         times: &mut StageTimes,
     ) -> Result<Keyed<S::Output>> {
-        let mut key = KeyBuilder::of_stage(S::NAME);
-        stage.hash_into(&mut key);
-        let key = key.finish();
+        let key = key_of(stage);
         if let Some(value) = self.get(stage.slot(), key) {
             return Ok(Keyed { key, value });
         }
@@ -146,9 +144,7 @@ impl Memo {
 
     /// The memoized output of a stage.
     pub(super) fn known<S: Stage>(&self, stage: &S) -> Option<Arc<S::Output>> {
-        let mut key = KeyBuilder::of_stage(S::NAME);
-        stage.hash_into(&mut key);
-        self.get(stage.slot(), key.finish())
+        self.get(stage.slot(), key_of(stage))
     }
 
     /// Frees the memoized output of a stage.
@@ -157,6 +153,13 @@ impl Memo {
         // The value is dropped after the lock is released.
         drop(value);
     }
+}
+
+/// The key of everything that the output of a stage depends on.
+pub(super) fn key_of<S: Stage>(stage: &S) -> Key {
+    let mut key = KeyBuilder::of_stage(S::NAME);
+    stage.hash_into(&mut key);
+    key.finish()
 }
 
 /// Reads the output of a stage from disk, or runs the stage and stores the output if that took long enough.
@@ -192,9 +195,7 @@ pub(super) fn run_without_memo<S: Stage>(
     disk: &Cache,
     times: &mut StageTimes,
 ) -> Result<S::Output> {
-    let mut key = KeyBuilder::of_stage(S::NAME);
-    stage.hash_into(&mut key);
-    compute(stage, key.finish(), env, disk, times)
+    compute(stage, key_of(stage), env, disk, times)
 }
 
 pub(super) fn elapsed_ms(start: Instant) -> f64 {

@@ -433,33 +433,3 @@ fn an_edit_of_a_colour_finds_the_papers_factors_in_the_memo() {
     assert_eq!(pipeline.memo.runs("basis"), 1);
     assert_eq!(edited, Pipeline::new().effective(&dark).unwrap().brdf.eval(i, o));
 }
-
-#[test]
-fn only_tiles_that_do_not_change_along_a_direction_have_four_azimuths() {
-    let azimuths = |geometry: &str| {
-        let source = format!(
-            "[tile]\ngeometry = {{ {geometry} }}\n[[material]]\nname = \"default\"\n\
-             brdf = {{ kind = \"lambertian\", albedo = 0.5 }}\n[quality]\npreset = \"draft\"\nbackend = \"cpu\"\n"
-        );
-        let scene = scene::parse(&source).unwrap();
-        let loaded =
-            LoadedScene { scene, base_dir: "".into(), name: "test".to_owned(), painted: scene::Painted::default() };
-        let outcome = Pipeline::new().effective(&loaded).unwrap();
-        assert_eq!(outcome.plan.algorithm == VisibilityAlgorithm::None, geometry.contains("flat"), "{geometry}");
-        outcome.settings.horizon_azimuths
-    };
-    for geometry in [
-        r#"kind = "grooves""#,
-        r#"kind = "grooves", profile = "u", depth = 0.4"#,
-        r#"kind = "grooves", profile = "rectangular", rotation_deg = 90"#,
-        r#"kind = "grooves", profile = "u", count = 4, rotation_deg = 27"#,
-        r#"kind = "heightfield", values = [[0.0, 0.3, 0.1]]"#,
-    ] {
-        assert_eq!(azimuths(geometry), 4, "{geometry}");
-    }
-    for geometry in
-        [r#"kind = "flat""#, r#"kind = "pyramids""#, r#"kind = "heightfield", values = [[0.0, 0.3], [0.1, 0.2]]"#]
-    {
-        assert_eq!(azimuths(geometry), 24, "{geometry}");
-    }
-}

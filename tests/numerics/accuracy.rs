@@ -97,6 +97,12 @@ fn a_flat_tile_has_the_small_scale_brdf_at_draft_and_standard() {
     }
 }
 
+/// The materials of [`Grooves`].
+const BRIGHT_BOTTOMS: &str = r#"{ kind = "lambertian", albedo = 0.0 }
+[[material]]
+name = "bottom"
+brdf = { kind = "lambertian", albedo = 1.0 }"#;
+
 /// Rectangular grooves with black sides and bottoms of albedo 1. Lengths are in pitches.
 struct Grooves {
     /// The plane direction across the grooves.
@@ -131,10 +137,6 @@ impl Grooves {
 /// pairs that see the bottoms.
 #[test]
 fn deep_grooves_with_bright_bottoms_have_the_reflection_of_their_closed_form() {
-    let materials = r#"{ kind = "lambertian", albedo = 0.0 }
-[[material]]
-name = "bottom"
-brdf = { kind = "lambertian", albedo = 1.0 }"#;
     for (preset, depth, min_psnr_db) in [
         ("standard", 0.25, [55.0, 50.0]),
         ("standard", 1.0, [55.0, 40.0]),
@@ -148,7 +150,7 @@ brdf = { kind = "lambertian", albedo = 1.0 }"#;
             r#"{{ kind = "grooves", profile = "rectangular", count = 4, bottom_width = 0.5, depth = {} }}"#,
             depth / 4.0
         );
-        let brdf = Pipeline::new().effective(&open(&geometry, materials, preset)).unwrap().brdf;
+        let brdf = Pipeline::new().effective(&open(&geometry, BRIGHT_BOTTOMS, preset)).unwrap().brdf;
         for (pairs, min_psnr_db) in [mirror_biased_pairs(2000, 5), grooves.pairs(2000)].into_iter().zip(min_psnr_db) {
             let exact: Vec<Vec3> = pairs.iter().map(|pair| Vec3::splat(grooves.reflection(pair))).collect();
             let errors = compare(&evaluate(&brdf, &pairs), &exact);
@@ -165,10 +167,6 @@ brdf = { kind = "lambertian", albedo = 1.0 }"#;
 /// angles.
 #[test]
 fn light_that_grazes_along_grooves_has_the_reflection_of_its_closed_form() {
-    let materials = r#"{ kind = "lambertian", albedo = 0.0 }
-[[material]]
-name = "bottom"
-brdf = { kind = "lambertian", albedo = 1.0 }"#;
     for (rotation_deg, across) in [(0, Vec2::X), (27, Vec2::new(2.0, 1.0).normalize_or_zero())] {
         let grooves = Grooves { across, bottom: 0.5, depth: 1.0 };
         let axis = across.perp().to_angle();
@@ -185,7 +183,7 @@ brdf = { kind = "lambertian", albedo = 1.0 }"#;
             depth = {} }}"#,
                 0.25 * if rotation_deg == 0 { 1.0 } else { 0.8_f32.sqrt() }
             );
-            let outcome = Pipeline::new().effective(&open(&geometry, materials, preset)).unwrap();
+            let outcome = Pipeline::new().effective(&open(&geometry, BRIGHT_BOTTOMS, preset)).unwrap();
             let errors = compare(&evaluate(&outcome.brdf, &pairs), &exact);
             eprintln!("turned by {rotation_deg}, {preset}: {errors:?}");
             assert!(errors.rel_l2 < 0.03, "turned by {rotation_deg}, {preset}: {errors:?}");

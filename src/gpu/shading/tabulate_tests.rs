@@ -189,8 +189,8 @@ fn groups_lobes_and_channels_have_the_same_columns_as_on_the_cpu() {
 fn normal_clusters_have_the_same_visible_areas_as_on_the_cpu() {
     let Some(gpu) = open_gpu() else { return };
     let two = format!("[{}, {}]", LOBES[4], LOBES[0]);
-    // A mirror plane of the tile maps one normal to another, so tables of cluster areas use no mirror planes.
     const TURNED: &str = "{ kind = \"grooves\", count = 4, rotation_deg = 27 }";
+    // A mirror plane of the tile maps one normal to another, so tables of cluster areas use no mirror planes.
     for (geometry, columns) in [(PYRAMIDS, 4), (GROOVES, 3), (TURNED, 3)] {
         let mut scene = open(geometry, &two, "direct");
         // With 29 azimuths, only the first lies along a node of the table, where all facets of a normal may meet an edge.

@@ -290,3 +290,7 @@ impl Stage for SampleFacets<'_> {
         Ok(facets)
     }
 }
+
+#[cfg(test)]
+#[path = "tile_tests.rs"]
+mod tests;
